@@ -4,8 +4,7 @@
 use std::collections::VecDeque;
 
 use anyhow::Result;
-use hums_core::health::{self, Level, Orders, check_named};
-use hums_core::observation::Feeds;
+use hums_core::health::Level;
 use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
 use hums_link::statustext::Severity;
 use hums_link::{messages, summary};
@@ -46,7 +45,8 @@ impl Texts {
         let mut buffer = [0; FRAME_BYTES_MAX];
         let wanted = list.iter().filter(|finding| context.selection.has_time(finding.at, &context.epochs));
         let texts = wanted.filter_map(|finding| {
-            let packet = messages::status_text(severity(finding)?, summary::text(&of_box(finding)?).as_str());
+            let packet =
+                messages::status_text(severity(finding)?, summary::text(&finding.of_box()?).as_str());
             let utc_us = context.epochs.utc_us(finding.at).unwrap_or_else(|| finding.at.as_micros());
             Some((utc_us, encoder.frame(&mut buffer, &packet).to_vec()))
         });
@@ -104,23 +104,4 @@ fn severity(finding: &Finding) -> Option<Severity> {
         (Level::Ok, Level::Warning | Level::Critical) => Some(Severity::Info),
         _ => None,
     }
-}
-
-/// As the box would have it; `None` of a check that no box makes.
-fn of_box(finding: &Finding) -> Option<health::Finding> {
-    let check = check_named(&finding.check)?;
-    Some(health::Finding {
-        at: finding.at.into(),
-        subsystem: finding.subsystem,
-        check: check.name,
-        instance: finding.instance,
-        level: finding.level,
-        previous: finding.previous,
-        value: finding.value,
-        limit: finding.limit,
-        unit: check.unit.name(),
-        feeds: Feeds::Unsaid,
-        because: "",
-        orders: Orders::Own,
-    })
 }

@@ -256,12 +256,7 @@ fn check_request(args: &DecodeRequest) -> Result<()> {
 }
 
 fn remark(found: &FoundRecordings, remarks: &[String]) {
-    for remark in remarks.iter().chain(&found.remarks) {
-        note!("{remark}");
-    }
-    for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
-        note!("{}: {}", image.path.display(), image.damage.join("; "));
-    }
+    found.tell(remarks);
     if found.places.is_empty() {
         note!("no log was found, so nothing was written");
     }

@@ -235,9 +235,9 @@ fn gaps_text(text: &mut String, log: &Overview) {
         );
     }
     if !own {
-        return foreign_gaps(text, log);
+        foreign_gaps(text, log);
     }
-    for gap in contents.gaps.iter().take(SHOWN_MAX) {
+    for gap in contents.gaps.iter().take(if own { SHOWN_MAX } else { 0 }) {
         let time = |at: Option<Instant>, none: &str| at.map_or_else(|| none.to_owned(), moment);
         let frames = gap
             .frames
@@ -264,7 +264,7 @@ fn gaps_text(text: &mut String, log: &Overview) {
 }
 
 fn foreign_gaps(text: &mut String, log: &Overview) {
-    let (summary, contents) = (&log.ending.summary, &log.contents);
+    let contents = &log.contents;
     for (gap, (cause, place, found)) in contents.gaps.iter().zip(&contents.gap_words).take(SHOWN_MAX) {
         let when = match (gap.from, gap.to) {
             (Some(from), Some(to)) => format!("from {} to {}", moment(from), moment(to)),
@@ -280,11 +280,6 @@ fn foreign_gaps(text: &mut String, log: &Overview) {
         };
         let _ = writeln!(text, "    {when}: {what}{place}{}", word(found));
     }
-    more(
-        text,
-        (summary.gaps + summary.losses).max(contents.gaps.len() as u64),
-        contents.gaps.len().min(SHOWN_MAX),
-    );
 }
 
 fn why(log: &Overview, gap: &Gap) -> &'static str {

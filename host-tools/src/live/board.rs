@@ -74,7 +74,7 @@ impl HealthBoard {
         for (check, _, level) in craft.monitor.health().levels() {
             let Some(known) = known.get_mut(check.subsystem as usize) else { continue };
             // Another link than the autopilot's wire has faults of its own.
-            if rank(level) > 0 && !craft.on_the_wire && is_of_wire(check.name) {
+            if level != Level::Ok && !craft.on_the_wire && is_of_wire(check.name) {
                 continue;
             }
             if level == Level::Ok && known.last != check.name {
@@ -277,14 +277,10 @@ fn action(check: &str) -> &'static str {
 }
 
 /// Unknown is between a warning and a known danger ([`hums_core::health`]).
-fn rank(level: Level) -> u8 {
-    match level {
-        Level::Ok => 0,
-        Level::Advisory => 1,
-        Level::Warning => 2,
-        Level::Stale => 3,
-        Level::Critical => 4,
-    }
+fn rank(level: Level) -> Option<usize> {
+    [Level::Ok, Level::Advisory, Level::Warning, Level::Stale, Level::Critical]
+        .iter()
+        .position(|one| *one == level)
 }
 
 #[cfg(test)]

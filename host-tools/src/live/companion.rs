@@ -25,7 +25,6 @@ pub struct Companion {
     overall: Option<Level>,
     flight_s: Option<f32>,
     flights: Option<f32>,
-    distance_m: Option<f32>,
 }
 
 /// As the page takes it.
@@ -33,13 +32,9 @@ pub struct Companion {
 pub struct CompanionJson {
     heard_ms: u64,
     gone: bool,
-    overall: Option<&'static str>,
-    levels: Option<Vec<&'static str>>,
-    levels_ms: Option<u64>,
     recorder: Option<&'static str>,
     flight_s: Option<f32>,
     flights: Option<f32>,
-    distance_m: Option<f32>,
 }
 
 impl Companion {
@@ -77,7 +72,6 @@ impl Companion {
             }
             "FLT_TIME_S" => self.flight_s = value,
             "FLIGHTS" => self.flights = value,
-            "DIST_M" => self.distance_m = value,
             _ => return,
         }
         self.heard = Some(at);
@@ -111,17 +105,12 @@ impl Companion {
     /// The companion for the page; `None` without one.
     pub fn json(&self, now: Instant) -> Option<CompanionJson> {
         let heard = self.heard.filter(|_| self.named)?;
-        let names = |levels: [Level; Subsystem::ALL.len()]| levels.into_iter().map(Level::name).collect();
         Some(CompanionJson {
             heard_ms: now.since(heard).as_millis(),
             gone: !self.present(now),
-            overall: self.overall.map(Level::name),
-            levels: self.levels.map(|(_, levels)| names(levels)),
-            levels_ms: self.levels.map(|(at, _)| now.since(at).as_millis()),
             recorder: self.level(now, Subsystem::Recorder).map(Level::name),
             flight_s: self.flight_s,
             flights: self.flights,
-            distance_m: self.distance_m,
         })
     }
 }

@@ -11,8 +11,8 @@ use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
 use hums_core::happening::Happening;
 use hums_core::health::exceedance::Exceedance;
-use hums_core::health::{Finding, Level, Orders, Scope, Subsystem, VOCABULARY, check_named};
-use hums_core::observation::{Autopilot, Feeds, Observation, Source};
+use hums_core::health::{Finding, Level, Scope, Subsystem, VOCABULARY};
+use hums_core::observation::{Autopilot, Observation, Source};
 use hums_core::parameters::Params;
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::usage::UsageCounter;
@@ -41,6 +41,9 @@ const JOINED: Span = Span::from_secs(5);
 /// Period of the limits' update.
 const LIMITS_EVERY: Span = Span::from_secs(1);
 
+/// By check and instance.
+type Findings = BTreeMap<(&'static str, u8), Finding>;
+
 /// State of a vehicle.
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
@@ -56,9 +59,9 @@ pub struct Craft {
     /// `RPM`, `RAW_RPM`: the first two sensors.
     pub speed_sensors: [Option<(Instant, f32)>; 2],
     /// Findings by check that is not well.
-    pub worries: BTreeMap<(&'static str, u8), Finding>,
+    pub worries: Findings,
     /// Bad, and no longer judged, until armed again or good.
-    pub unjudged: BTreeMap<(&'static str, u8), Finding>,
+    pub unjudged: Findings,
     /// Cells unknown, and the vehicle flies or will not report it.
     pub cells_unknown: bool,
     /// That was reported.
@@ -294,15 +297,7 @@ impl Craft {
             if !*on_the_wire && echo {
                 return;
             }
-            unjudged.remove(&key);
-            let before = worries.remove(&key);
-            match finding.level {
-                Level::Ok if finding.value.is_nan() => unjudged.extend(before.map(|before| (key, before))),
-                Level::Ok => {}
-                _ => {
-                    worries.insert(key, *finding);
-                }
-            }
+            judge(worries, unjudged, *finding);
             found.push(*finding);
             findings(finding);
         });
@@ -381,40 +376,28 @@ impl Craft {
 
     /// A box's finding that no check here can make: from its store or its cell count.
     pub fn found_on_board(&mut self, finding: &told::Finding) -> bool {
-        let Some(check) = check_named(&finding.check) else { return false };
-        if self.judges(check.name, finding.instance) {
-            return false;
+        let Some(finding) = finding.of_box() else { return false };
+        let is_new = !self.judges(finding.check, finding.instance);
+        if is_new {
+            judge(&mut self.worries, &mut self.unjudged, finding);
         }
-        let key = (check.name, finding.instance);
-        let before = self.worries.remove(&key);
-        match finding.level {
-            Level::Ok if finding.value.is_nan() => self.unjudged.extend(before.map(|before| (key, before))),
-            Level::Ok => {}
-            _ => {
-                self.unjudged.remove(&key);
-                let finding = Finding {
-                    at: finding.at.into(),
-                    subsystem: check.subsystem,
-                    check: check.name,
-                    instance: finding.instance,
-                    level: finding.level,
-                    previous: finding.previous,
-                    value: finding.value,
-                    limit: finding.limit,
-                    unit: check.unit.name(),
-                    feeds: Feeds::Unsaid,
-                    because: "",
-                    orders: Orders::Own,
-                };
-                self.worries.insert(key, finding);
-            }
-        }
-        true
+        is_new
     }
 
     /// Its phase of flight.
     pub fn phase(&self, now: Instant) -> Phase {
         self.monitor.flight().phase(now.into(), self.monitor.vehicle())
+    }
+}
+
+fn judge(worries: &mut Findings, unjudged: &mut Findings, finding: Finding) {
+    let key = (finding.check, finding.instance);
+    unjudged.remove(&key);
+    let before = worries.remove(&key);
+    if finding.level != Level::Ok {
+        worries.insert(key, finding);
+    } else if finding.value.is_nan() {
+        unjudged.extend(before.map(|before| (key, before)));
     }
 }
 

@@ -28,19 +28,15 @@ impl Guard {
     /// The user named it `host`; returns the token that the page needs.
     pub fn new(listen: SocketAddr, host: &str, token: Option<&str>) -> Result<(Self, Option<String>)> {
         let token = match token {
-            Some(short) if short.len() < TOKEN_CHARS_MIN => {
-                return Err(usage(format!(
-                    "--listen-token: is too short; give at least {TOKEN_CHARS_MIN} characters"
-                )));
+            Some(given) => {
+                let is_good = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
+                if given.len() < TOKEN_CHARS_MIN || !given.bytes().all(is_good) {
+                    return Err(usage(format!(
+                        "--listen-token: give at least {TOKEN_CHARS_MIN} letters, digits, or - _ ."
+                    )));
+                }
+                Some(given.to_owned())
             }
-            Some(given)
-                if !given.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte)) =>
-            {
-                return Err(usage(
-                    "--listen-token: has other characters; give letters, digits, and - _ . only",
-                ));
-            }
-            Some(given) => Some(given.to_owned()),
             None if listen.ip().is_loopback() => None,
             None => Some(random()?),
         };

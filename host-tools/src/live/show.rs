@@ -48,10 +48,7 @@ struct Head<'a> {
     now_s: f64,
     /// Milliseconds since 1970, if known.
     utc_ms: Option<u64>,
-    frames: u64,
     frames_s: f64,
-    unverified: u64,
-    refused: u64,
     vehicles: Vec<VehicleJson>,
     influx: Option<&'a super::influx::Figures>,
 }
@@ -92,10 +89,7 @@ pub fn all(world: &World, now: Instant, around: &HeadInputs<'_>) -> (String, Vec
         source: around.source,
         now_s: now.as_secs_f64(),
         utc_ms: around.epoch_us.map(|epoch| epoch.saturating_add(now.as_micros()) / 1000),
-        frames: world.frames,
         frames_s: around.frames_s,
-        unverified: world.unverified,
-        refused: world.refused,
         vehicles: vehicles.collect(),
         influx: around.influx.as_ref(),
     });
@@ -159,7 +153,6 @@ struct ComponentJson {
     /// Reached first.
     limit: Option<String>,
     flight_h: f64,
-    motor_h: f64,
     flights: f64,
     life: bool,
 }
@@ -247,7 +240,6 @@ fn components(craft: &Craft) -> Vec<ComponentJson> {
             used_percent: craft.monitor.component_used_percent(place).filter(|percent| percent.is_finite()),
             limit: part::of(&craft.monitor, place).and_then(|(_, limit)| limit),
             flight_h: figures.flight_s / 3_600.0,
-            motor_h: figures.motor_s / 3_600.0,
             flights: figures.flights,
             life: craft.knows_life(place),
         })

@@ -15,7 +15,6 @@ use super::told::{Limits, MonitorRecord, parameter, place_of};
 use crate::check::SETTLE;
 use crate::mavlink::ids::PARAM_VALUE;
 use crate::page::history::History;
-use crate::page::more::RowValues;
 use crate::page::note::Note;
 use crate::source::told::Finding as BoxFinding;
 
@@ -33,14 +32,12 @@ const BEGINNING: Instant = Instant::from_millis(10_000);
 pub type Histories = BTreeMap<u8, History>;
 
 /// All vehicles and frames.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct World {
     /// By system id.
     pub crafts: BTreeMap<u8, Craft>,
     /// Number of frames received, from any sender.
     pub frames: u64,
-    /// Frames of no known definition.
-    pub unverified: u64,
     /// Frames of vehicles beyond [`VEHICLES_MAX`].
     pub refused: u64,
     /// Findings since last cleared, at most `FOUND_MAX`.
@@ -66,19 +63,7 @@ const FOUND_MAX: usize = 4_096;
 impl World {
     /// Empty.
     pub fn new(limits: Limits) -> Self {
-        Self {
-            crafts: BTreeMap::new(),
-            frames: 0,
-            unverified: 0,
-            refused: 0,
-            found: Vec::new(),
-            limits,
-            on_the_wire: false,
-            owner: None,
-            early: Vec::new(),
-            parts: [None; COMPONENTS_MAX],
-            next_tick: Instant::ZERO,
-        }
+        Self { limits, ..Self::default() }
     }
 
     /// Frames from the autopilot's own wire.
@@ -97,7 +82,6 @@ impl World {
         self.advance(at, histories.as_deref_mut());
         self.frames += 1;
         if frame.check() != Check::Verified {
-            self.unverified += 1;
             return;
         }
         let system = frame.system();
@@ -157,8 +141,16 @@ impl World {
         let system = match entry {
             Entry::Observation(source, _) => source.system,
             Entry::Text(text) => text.source.system,
-            Entry::Parameter(name, value) => return self.told_parameter(at, name, *value, histories),
-            Entry::More(more) => return self.told_more(at, more, histories),
+            Entry::Parameter(..) | Entry::More(_) => {
+                // Parameters come before the vehicle is known.
+                let only = self.crafts.keys().next().copied().unwrap_or(1);
+                let history = histories.map(|histories| histories.entry(only).or_default());
+                return match (history, entry) {
+                    (Some(history), Entry::Parameter(name, value)) => history.parameter(at, name, *value),
+                    (Some(history), Entry::More(more)) => history.more(at, more),
+                    _ => {}
+                };
+            }
             Entry::Gap(from, to) => return self.pass(*from, *to, histories),
         };
         self.advance(at, histories.as_deref_mut());
@@ -175,23 +167,6 @@ impl World {
             Entry::Observation(source, observation) => craft.observe(at, *source, observation, &mut history),
             Entry::Text(text) => craft.text(text.clone(), &mut history),
             Entry::Parameter(..) | Entry::More(_) | Entry::Gap(..) => {}
-        }
-    }
-
-    /// System 1: parameters come before the vehicle is known.
-    fn only(&self) -> u8 {
-        self.crafts.keys().next().copied().unwrap_or(1)
-    }
-
-    fn told_parameter(&self, at: Instant, name: &str, value: f64, histories: Option<&mut Histories>) {
-        if let Some(histories) = histories {
-            histories.entry(self.only()).or_default().parameter(at, name, value);
-        }
-    }
-
-    fn told_more(&self, at: Instant, more: &RowValues, histories: Option<&mut Histories>) {
-        if let Some(histories) = histories {
-            histories.entry(self.only()).or_default().more(at, more);
         }
     }
 

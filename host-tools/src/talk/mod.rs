@@ -23,6 +23,7 @@ use hums_link::packet::{Fields, Packet};
 use hums_link::signing::{Clock, Key, Seal, stamp};
 use hums_link::{Check, Frame, Framer, messages};
 
+use crate::check;
 use crate::cli::Link;
 use crate::duplex::{self, Duplex};
 use crate::files::read_short;
@@ -31,6 +32,8 @@ use crate::interrupt;
 use crate::logs::board::Board;
 use crate::mavlink::ids::{AUTOPILOT_VERSION, COMMAND_ACK, HEARTBEAT};
 use crate::outcome::usage;
+use crate::source::find::find;
+use crate::summary::Contents;
 
 /// Offset of `uid2` in `AUTOPILOT_VERSION`.
 const UID_AT: usize = 60;
@@ -45,7 +48,6 @@ const LISTEN: Duration = Duration::from_millis(2_200);
 /// Radios and UDP peers learn from them where to answer.
 const PRESENCE: Duration = Duration::from_secs(1);
 const READ: Duration = Duration::from_millis(20);
-/// Size of a key file, which has one line.
 const KEY_FILE_BYTES_MAX: u64 = 4096;
 /// Unlike a ground station's first, so that each counts its own time.
 const LINK: u8 = 17;
@@ -67,9 +69,6 @@ pub struct Client {
 
 impl Client {
     /// Finds the box of `--system`, or the only one on the link, and prints which.
-    ///
-    /// # Errors
-    /// No box; several without `--system` (usage error).
     pub fn connect(link: &Link) -> Result<Self> {
         // No wait for other boxes.
         Self::connect_to(link, &[COMPONENT])
@@ -91,12 +90,16 @@ impl Client {
             return Err(usage(format!("--link {endpoint}: a file does not answer; give udp, tcp or serial")));
         }
         let seal = link.key.as_deref().map(key).transpose()?.map(|key| Seal::new(key, LINK, our_time(), 0));
-        let duplex = duplex::open(endpoint, READ)?;
         interrupt::watch();
-        let mut client = Self::over(duplex, seal);
-        client.find(components, link.system, listen).with_context(|| endpoint.to_string())?;
+        let client = Self::over(duplex::open(endpoint, READ)?, seal);
+        let client = client.found(link, components, listen)?;
         note!("system {}: its {} is heard", client.system, who(client.component));
         Ok(client)
+    }
+
+    fn found(mut self, link: &Link, components: &[u8], listen: Duration) -> Result<Self> {
+        self.find(components, link.system, listen).with_context(|| link.link.to_string())?;
+        Ok(self)
     }
 
     fn over(duplex: Duplex, seal: Option<Seal>) -> Self {
@@ -329,20 +332,32 @@ const fn is_for_us(system: u8, component: u8) -> bool {
 
 /// 64 hexadecimal digits, or a passphrase.
 pub fn key(path: &Path) -> Result<Key> {
-    let text = String::from_utf8(read_short(path, KEY_FILE_BYTES_MAX).context("--key")?).map_err(|_| {
-        usage(format!(
-            "--key {}: is no text; it wants 64 hexadecimal digits, or a passphrase",
-            path.display()
-        ))
-    })?;
-    let text = text.trim_end_matches(['\r', '\n']);
+    let bytes = read_short(path, KEY_FILE_BYTES_MAX).context("--key")?;
+    let text = str::from_utf8(&bytes).unwrap_or_default().trim_end_matches(['\r', '\n']);
     if text.is_empty() {
         return Err(usage(format!(
-            "--key {}: is empty; it wants 64 hexadecimal digits, or a passphrase",
+            "--key {}: is empty or no text; it wants 64 hexadecimal digits, or a passphrase",
             path.display()
         )));
     }
     Ok(hex::bytes_of(text).map_or_else(|| Key::of_passphrase(text), Key))
+}
+
+/// From a mounted card's newest log that has it.
+fn of_newest<T>(card: &Path, of_log: impl Fn(Contents) -> Option<T>) -> Result<Option<T>> {
+    if !card.is_dir() {
+        return Err(usage(format!(
+            "--card {}: is no folder; mount the card, and name its root",
+            card.display()
+        )));
+    }
+    let Ok(found) = find(&[card.to_owned()], false) else { return Ok(None) };
+    for place in found.places.iter().rev().filter(|place| place.own().is_some()) {
+        if let Some(found) = of_log(check::overview(place)?.contents) {
+            return Ok(Some(found));
+        }
+    }
+    Ok(None)
 }
 
 /// This PC's time, as signatures count it.

@@ -11,14 +11,13 @@ use hums_link::mav_cmd::USER_1_REPLACED;
 use hums_link::param_line::{self, Line};
 use serde::Serialize;
 
-use super::{Client, accepted, params};
-use crate::check;
+use super::{Client, accepted, of_newest, params};
 use crate::cli::{self, Link};
 use crate::files::{Inputs, Output, settle};
 use crate::outcome::{Outcome, usage};
 use crate::output::{self, Schema};
 use crate::part;
-use crate::source::find::find;
+use crate::summary::Contents;
 
 const ANSWER: Duration = Duration::from_secs(2);
 /// Tries: with a serial number a repeated command replaces the part once.
@@ -126,27 +125,15 @@ fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
 }
 
 fn on_card(card: &Path, part: ComponentKind, number: u8) -> Result<(usize, String)> {
-    if !card.is_dir() {
-        return Err(usage(format!(
-            "--card {}: is no folder; mount the card, and name its root",
-            card.display()
-        )));
-    }
-    let found = find(&[card.to_owned()], false)?;
-    for place in found.places.iter().rev().filter(|place| place.own().is_some()) {
-        let components = check::overview(place)?.contents.components;
-        if !components.is_empty() {
-            let kind = |name: &str| {
-                ComponentKind::ALL.into_iter().find(|kind| kind.name() == name).unwrap_or_default()
-            };
-            let known =
-                components.iter().map(|(place, line)| (usize::from(*place), kind(line.kind), line.number));
-            let place = place_of(known, part, number)?;
-            let line = components.get(&(place as u8));
-            return Ok((place, line.map_or_else(String::new, |line| line.serial.clone())));
-        }
-    }
-    bail!("{}: no log on it has components; set CMPn_KIND first (docs/usage.md)", card.display())
+    let components = |contents: Contents| Some(contents.components).filter(|all| !all.is_empty());
+    let components = of_newest(card, components)?.with_context(|| {
+        format!("{}: no log on it has components; set CMPn_KIND first (docs/usage.md)", card.display())
+    })?;
+    let kind =
+        |name: &str| ComponentKind::ALL.into_iter().find(|kind| kind.name() == name).unwrap_or_default();
+    let known = components.iter().map(|(place, line)| (usize::from(*place), kind(line.kind), line.number));
+    let place = place_of(known, part, number)?;
+    Ok((place, components.get(&(place as u8)).map_or_else(String::new, |line| line.serial.clone())))
 }
 
 fn write(card: &Path, place: usize, serial: &str, old: &str) -> Result<PathBuf> {

@@ -10,12 +10,11 @@ use hums_update::header::{self, Header, Version};
 use hums_update::{keys, map};
 use serde::Serialize;
 
-use crate::check;
+use super::of_newest;
 use crate::cli;
 use crate::files::{read_short, settle};
-use crate::outcome::{Outcome, usage};
+use crate::outcome::Outcome;
 use crate::output::{self, Schema};
-use crate::source::find::find;
 
 /// On the card: the update, the one before it, and one that is being written.
 const UPDATE: &str = "HUMS.UPD";
@@ -46,7 +45,9 @@ pub fn run(args: &cli::Update) -> Result<Outcome> {
     let mut bytes = read_short(&args.image, map::APPLICATION_BYTES as u64)?;
     let mut header = judge(&bytes).map_err(|why| anyhow::anyhow!("{name}: {why}"))?;
     let version = header.version.to_string();
-    let newest = newest(&args.card)?;
+    let newest = of_newest(&args.card, |contents| {
+        contents.boot.map(|boot| Newest { board: boot.board, version: boot.version, commit: boot.git })
+    })?;
     if let Some(Newest { board, version: running, .. }) = &newest {
         if board != header.board() {
             bail!("{name} is for the board {}, and the card is of a box with {board}", header.board());
@@ -120,23 +121,6 @@ impl Newest {
         let is_commit = !self.commit.is_empty() && header.commit().starts_with(&self.commit);
         is_commit && Version::parse(&self.version) == Some(header.version)
     }
-}
-
-fn newest(card: &Path) -> Result<Option<Newest>> {
-    if !card.is_dir() {
-        return Err(usage(format!(
-            "--card {}: is no folder; mount the card, and name its root",
-            card.display()
-        )));
-    }
-    // A new card has no logs.
-    let Ok(found) = find(&[card.to_owned()], false) else { return Ok(None) };
-    for place in found.places.iter().rev().filter(|place| place.own().is_some()) {
-        if let Some(boot) = check::overview(place)?.contents.boot {
-            return Ok(Some(Newest { board: boot.board, version: boot.version, commit: boot.git }));
-        }
-    }
-    Ok(None)
 }
 
 /// Written whole under another name first. The update that is there becomes the one before, if it wrote the newest log.

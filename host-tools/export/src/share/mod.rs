@@ -45,19 +45,13 @@ const TEXTS: &str = "texts";
 const PARAMETERS: &str = "parameters";
 
 /// The rules of texts, for other files that people give away.
+#[derive(Default)]
 pub struct TextRules(Rules);
 
 impl TextRules {
     /// Whether a text names neither place nor person.
     pub fn keeps(&self, text: &str) -> bool {
         self.0.keeps_text(text)
-    }
-}
-
-impl Default for TextRules {
-    /// The rules of all messages.
-    fn default() -> Self {
-        Self(Rules::new())
     }
 }
 
@@ -84,7 +78,6 @@ pub fn run(args: &ShareRequest) -> Result<Outcome> {
 /// Returns what was removed, and whether the recording has damage.
 fn copy(args: &ShareRequest) -> Result<(Share, bool)> {
     let found = find(std::slice::from_ref(&args.input), false)?;
-    found.remarks.iter().for_each(|remark| note!("{remark}"));
     let wanted = found.name_of(args.session.as_deref())?;
     let mut places =
         found.places.iter().filter(|place| wanted.as_ref().is_none_or(|name| *name == place.name));
@@ -100,7 +93,7 @@ fn copy(args: &ShareRequest) -> Result<(Share, bool)> {
     }
     let inputs = Inputs::of([args.input.as_path()].into_iter().chain(found.paths())).forcing(args.force);
     let context = Context { inputs: Arc::new(inputs), ..Context::default() };
-    let mut share = Share::new();
+    let mut share = Share::default();
     let lossy = if place.open()?.format.is_of_link() || place.own().is_some() {
         share.link(place, &context, args)?
     } else {
@@ -109,6 +102,7 @@ fn copy(args: &ShareRequest) -> Result<(Share, bool)> {
     Ok((share, lossy))
 }
 
+#[derive(Default)]
 struct Share {
     rules: Rules,
     moved: Displacement,
@@ -122,18 +116,6 @@ struct Share {
 }
 
 impl Share {
-    fn new() -> Self {
-        Self {
-            rules: Rules::new(),
-            moved: Displacement::default(),
-            removed: BTreeMap::new(),
-            seen: BTreeMap::new(),
-            removed_others: 0,
-            kept: 0,
-            systems: BTreeMap::new(),
-        }
-    }
-
     fn see(&mut self, what: &str) {
         if let Some(number) = self.seen.get_mut(what) {
             *number += 1;

@@ -71,8 +71,8 @@ pub(super) fn places(message: &'static Message, kept: &BTreeMap<&str, Rule>) -> 
     message.fields.iter().map(place).collect()
 }
 
-impl Rules {
-    pub(super) fn new() -> Self {
+impl Default for Rules {
+    fn default() -> Self {
         let mut messages = BTreeMap::new();
         for mut words in lines(FIELDS) {
             let name = words.next().unwrap_or_default();
@@ -92,7 +92,9 @@ impl Rules {
         };
         Self { messages, keep: parts("keep"), drop: parts("drop"), words: lines(WORDS).flatten().collect() }
     }
+}
 
+impl Rules {
     pub(super) fn fields(&self, id: u32) -> Option<&[FieldRule]> {
         self.messages.get(&id).map(Vec::as_slice)
     }
@@ -147,7 +149,7 @@ mod tests {
 
     #[test]
     fn parameters_and_texts_are_kept_by_their_words() {
-        let rules = Rules::new();
+        let rules = Rules::default();
         for (name, kept) in [
             ("ATC_RAT_RLL_P", true),
             ("BATT_LOW_VOLT", true),

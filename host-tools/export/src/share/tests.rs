@@ -91,7 +91,7 @@ fn observations(path: &Path) -> Vec<Observation> {
 fn no_fact_of_any_message_is_in_the_copy_of_a_recording() {
     let dir = tempfile::tempdir().expect("a folder");
     let (input, output) = (dir.path().join("in.tlog"), dir.path().join("out.tlog"));
-    let rules = Rules::new();
+    let rules = Rules::default();
     let mut tlog = Vec::new();
     let global = |north: i32, up: i32| {
         let at = |degrees: f64| (degrees * 1e7).round() as i32;

@@ -240,9 +240,9 @@ impl FoundRecordings {
         })
     }
 
-    /// Prints the remarks.
-    pub fn tell(&self) {
-        for remark in &self.remarks {
+    /// Prints the remarks, after those `before`.
+    pub fn tell(&self, before: &[String]) {
+        for remark in before.iter().chain(&self.remarks) {
             note!("{remark}");
         }
         for image in self.images.iter().filter(|image| !image.damage.is_empty()) {

@@ -4,7 +4,8 @@ use hums_blackbox::Record;
 use hums_blackbox::record::{FindingRecord, LossKind, RecordReason};
 use hums_core::clock::Instant;
 use hums_core::component::{COMPONENTS_MAX, Component, Label};
-use hums_core::health::{self, Level, Subsystem};
+use hums_core::health::{self, Level, Orders, Subsystem, check_named};
+use hums_core::observation::Feeds;
 use hums_onboard::monitoring::CELLS_UNKNOWN;
 use hums_onboard::persist::STORE_NEW;
 
@@ -88,6 +89,25 @@ impl Finding {
     /// Unjudged: after landing the check no longer applies, and is not known to be good.
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok && self.value.is_nan()
+    }
+
+    /// As the box has it; `None` of a check that no box makes.
+    pub fn of_box(&self) -> Option<health::Finding> {
+        let check = check_named(&self.check)?;
+        Some(health::Finding {
+            at: self.at.into(),
+            subsystem: check.subsystem,
+            check: check.name,
+            instance: self.instance,
+            level: self.level,
+            previous: self.previous,
+            value: self.value,
+            limit: self.limit,
+            unit: check.unit.name(),
+            feeds: Feeds::Unsaid,
+            because: "",
+            orders: Orders::Own,
+        })
     }
 
     /// In the box's words: `battery 1 cell low`, `over: battery 1 cell low`, `no data: battery 1 cell voltage`.

@@ -76,7 +76,7 @@ pub struct Cursor {
 }
 
 /// The part of a history that a page does not have yet.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct HistoryPart {
     pub(super) t: &'static str,
     pub(super) vehicle: u8,
@@ -119,7 +119,7 @@ pub struct PlotJson {
 }
 
 /// Each line's new intervals: `"Altitude:0": [numbers, values]`; numbers count from the one before, the first from 0.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Series(pub(super) Vec<(String, u8, series::Part)>);
 
 impl Serialize for Series {

@@ -66,21 +66,12 @@ pub fn merged(flights: &[MergedFlight<'_>]) -> HistoryPart {
     let plots = plots(&store, flights);
     HistoryPart {
         t: "history",
-        vehicle: 0,
         reset: true,
         start_s: start_ms as f64 / 1e3,
         step_s: step_ms as f64 / 1e3,
         plots: Some(plots),
         series: Series(series),
-        notes: Vec::new(),
-        notes_gone: 0,
-        track: Vec::new(),
-        phases: None,
-        modes: None,
-        gaps: None,
-        parameters: Vec::new(),
-        parameters_left_out: 0,
-        tells_defaults: false,
+        ..HistoryPart::default()
     }
 }
 

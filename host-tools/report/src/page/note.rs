@@ -40,7 +40,7 @@ pub struct Note {
 }
 
 /// A finding of a check.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct FindingNote {
     /// The check's stable name.
     pub check: String,
@@ -203,16 +203,9 @@ impl Note {
             found: Some(FindingNote {
                 check: check.to_owned(),
                 instance,
-                previous: "",
-                ended: false,
-                value: None,
-                state: None,
-                limit: None,
-                unit: String::new(),
-                measured: String::new(),
                 meaning: if is_worry { known.meaning } else { "" },
                 action: if is_worry { known.action } else { "" },
-                because: None,
+                ..FindingNote::default()
             }),
         })
     }

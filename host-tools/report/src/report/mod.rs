@@ -95,12 +95,7 @@ pub fn run_into(args: &Request<'_>, put: &mut PageSink<'_>) -> Result<Outcome> {
     let output = &args.output.map_or_else(|| beside(args.inputs), |output| Ok(output.to_owned()))?;
     let (given, remarks) = without_made(args.inputs);
     let mut found = find(&given, false)?.of_system(args.system)?;
-    for remark in remarks.iter().chain(&found.remarks) {
-        note!("{remark}");
-    }
-    for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
-        note!("{}: {}", image.path.display(), image.damage.join("; "));
-    }
+    found.tell(&remarks);
     if let Some(place) = found.places.iter().find(|place| place.is_standard()) {
         bail!("{}: is read twice for a page; give a file", place.title)
     }
