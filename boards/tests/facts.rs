@@ -45,8 +45,7 @@ fn each_pin_price_and_page_of_each_board_is_that_of_its_sources_and_none_is_miss
 
 #[test]
 fn the_page_is_that_of_the_files() {
-    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../");
-    let read = |path: &str| std::fs::read_to_string(format!("{root}{path}")).unwrap();
+    let read = |path| std::fs::read_to_string(format!("{}/../{path}", env!("CARGO_MANIFEST_DIR"))).unwrap();
     assert!(
         read("docs/boards.md") == hums_boards::page::render(),
         "docs/boards.md is old: cargo xtask boards"
@@ -55,4 +54,11 @@ fn the_page_is_that_of_the_files() {
         read("README.md").contains(&hums_boards::page::table("docs/boards.md")),
         "README.md: cargo xtask boards"
     );
+    let hums_boards::Board { card, radio, autopilot, led, .. } =
+        hums_boards::find("olimex-stm32-h405").unwrap();
+    let wires = [autopilot.rx.pin, autopilot.tx.pin, radio.tx.pin, radio.rx.pin];
+    let pins = [&wires[..], &[card.cs, card.sck, card.miso, card.mosi, led.pin]].concat();
+    let svg = read("docs/wiring.svg");
+    let drawn = svg.split(">P").skip(1).map(|rest| format!("P{}", &rest[..rest.find('<').unwrap()]));
+    assert!(drawn.eq(pins.iter().map(ToString::to_string)), "docs/wiring.svg");
 }
