@@ -253,16 +253,19 @@ fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
     let recording = cut(&own("ap_quad_faults.tlog"), 75.0, &dir.path().join("late.tlog"));
     let frames = frames(&recording);
     let port = free_port();
-    let live = Live::start(&[&format!("udpin:127.0.0.1:{port}")]);
+    let live = Live::start(&["--setup", &format!("udpin:127.0.0.1:{port}")]);
     let mut page = LivePage::start();
     page.open(&live.address, "dark", 1440, 900);
     page.wait("return document.getElementById('source').textContent === 'waiting'", 20);
+    page.run("document.querySelector('[data-panel=bench] button').click()");
+    page.wait("return document.querySelector('[data-panel=bench]').textContent.includes('checking')", 5);
     let mut sim = command(["sim", "--speed", "real"]);
     sim.arg(&recording).arg("--sd").arg(dir.path().join("card.img"));
     sim.arg("--gs").arg(format!("udpout:127.0.0.1:{port}")).stdout(Stdio::null()).stderr(Stdio::null());
     let began = Instant::now();
     let sim = Running(sim.spawn().unwrap());
     page.wait("return document.getElementById('source').textContent === 'live'", 20);
+    page.wait("return document.querySelector('[data-panel=bench]').hidden", 20);
     page.wait("return document.querySelector('[data-value=satellites]').textContent.length > 1", 30);
 
     let until = Instant::now() + Duration::from_secs(8);

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fs;
-use std::net::UdpSocket;
+use std::io::Write as _;
+use std::net::{TcpStream, UdpSocket};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use hums_link::packet::{Fields, Packet};
 use hums_link::{Frame, Framer, ids, messages};
 use hums_tests::child::Outcome;
 use hums_tests::flights::own;
-use hums_tests::live::free_port;
+use hums_tests::live::{Live, free_port};
 use hums_tests::program::hums;
 use serde_json::Value;
 
@@ -22,33 +22,24 @@ use super::board::Board;
 
 type Values = Arc<Mutex<BTreeMap<String, f32>>>;
 
-/// Plays the recording from power-on in real time.
-struct Autopilot {
-    values: Values,
-    over: Arc<AtomicBool>,
-}
+/// Plays the recording from power-on in real time, until it is dropped.
+struct Autopilot(Values);
 
 impl Autopilot {
     fn start(port: u16, values: &[(&str, f32)]) -> Self {
         let values = values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
-        let (values, over): (Values, _) = (Arc::new(Mutex::new(values)), Arc::new(AtomicBool::new(false)));
-        let (known, ended) = (Arc::clone(&values), Arc::clone(&over));
-        thread::spawn(move || play(port, &known, &ended));
-        Self { values, over }
+        let values = Arc::new(Mutex::new(values));
+        let known = Arc::clone(&values);
+        thread::spawn(move || play(port, &known));
+        Self(values)
     }
 
     fn values(&self) -> Vec<(String, f32)> {
-        self.values.lock().unwrap().clone().into_iter().collect()
+        self.0.lock().unwrap().clone().into_iter().collect()
     }
 }
 
-impl Drop for Autopilot {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-    }
-}
-
-fn play(port: u16, values: &Values, over: &AtomicBool) {
+fn play(port: u16, values: &Values) {
     let tlog = fs::read(own("ap_quad_guided.tlog")).unwrap();
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.connect(("127.0.0.1", port)).unwrap();
@@ -56,7 +47,7 @@ fn play(port: u16, values: &Values, over: &AtomicBool) {
     let (mut framer, mut encoder) = (Framer::new(), Encoder::of(1, 1));
     let (start, mut first_us, mut rest) = (Instant::now(), None, &tlog[..]);
     let (mut waiting, mut out) = (VecDeque::new(), [0; FRAME_BYTES_MAX]);
-    while let Some((time, frames)) = rest.split_first_chunk::<8>().filter(|_| !over.load(Ordering::Relaxed)) {
+    while let Some((time, frames)) = rest.split_first_chunk::<8>().filter(|_| Arc::strong_count(values) > 1) {
         let us = u64::from_be_bytes(*time);
         let due = Duration::from_micros(us - *first_us.get_or_insert(us));
         while start.elapsed() < due {
@@ -126,16 +117,21 @@ fn an_autopilot_is_set_for_the_box_and_the_bench_check_says_that_it_is_ready() {
     let owned = |values: [(&str, f32); 3]| values.map(|(name, value)| (name.to_owned(), value)).to_vec();
     assert_eq!(autopilot.values(), owned(wanted));
     // The autopilot sends its streams a few seconds after power-on, and arms after 43 s.
-    let start = Instant::now();
-    loop {
+    let (start, mut code) = (Instant::now(), None);
+    while code != Some(0) {
         let checked = on(&address, &["setup", "--json"]).expect_code(&[0, 4]);
         let told = json(&checked.text());
-        assert_eq!(told["ready"], checked.code == Some(0), "{told}");
-        if checked.code == Some(0) {
-            break;
-        }
-        assert!(start.elapsed() < Duration::from_secs(30), "not ready: {told}");
+        code = checked.code;
+        assert_eq!(told["ready"], code == Some(0), "{told}");
+        assert!(start.elapsed() < Duration::from_secs(40), "not ready: {told}");
     }
+    // The page shows the same check.
+    let live = Live::start(&["--setup", &address]);
+    let (mut page, mut stream) = (live.page().unwrap(), TcpStream::connect(live.host()).unwrap());
+    let body = "Content-Length: 22\r\n\r\n{\"cmd\":\"check\",\"to\":1}";
+    write!(stream, "POST /command HTTP/1.1\r\nHost: {}\r\n{body}", live.host()).unwrap();
+    let shown = (0..).map(|_| json(&page.message())).find(|message| message["found"].is_object()).unwrap();
+    assert_eq!(shown["words"], "ready to fly", "{shown}");
 
     on(&address, &["setup", "--restore", &undo]).expect_code(&[0]);
     assert_eq!(autopilot.values(), owned(before));

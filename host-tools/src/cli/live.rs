@@ -15,7 +15,7 @@ const LIVE_EXAMPLES: &str = "Examples:
   hums live udpin:0.0.0.0:14550 --listen 0.0.0.0:8080
 
 The address to open is printed to standard output. Ctrl-C ends it. A recording or a log is played, and can be paused,
-wound back and forth, and played at other speeds. Nothing is sent to the vehicle.
+wound back and forth, and played at other speeds. Nothing is sent to the vehicle without --setup.
 For a phone or a tablet: --listen 0.0.0.0:8080. The address of this PC in its network is then printed too, and on a terminal
 as a code for the phone's camera. Such an address ends with a token; the page shows nothing without it.";
 
@@ -35,6 +35,10 @@ pub struct Live {
     /// Token that the page asks for, in place of a random one; then it is needed on 127.0.0.1 too
     #[arg(long, value_name = "TOKEN")]
     pub listen_token: Option<String>,
+    /// Let the page run the bench check of `hums box setup`; N is --port there
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "2")]
+    #[arg(value_parser = clap::value_parser!(u8).range(1..=9))]
+    pub setup: Option<u8>,
     /// Set these limits before the start: `NAME VALUE` or `NAME,VALUE` lines, or a QGroundControl file
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,

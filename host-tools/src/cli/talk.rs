@@ -333,6 +333,14 @@ pub struct Setup {
     pub json: bool,
 }
 
+impl Setup {
+    /// For the page.
+    pub const fn of_page(link: Endpoint, port: u8) -> Self {
+        let at = Link { link, key: None, system: None };
+        Self { at, board: None, port, set: false, undo: None, restore: None, json: true }
+    }
+}
+
 const UPDATE_EXAMPLES: &str = "Examples:
   hums box update hums-matek-f405-std.upd --card /media/card
 

@@ -12,20 +12,20 @@ use anyhow::Result;
 use hums_core::clock::Instant;
 use hums_link::framer::Framer;
 
-use super::hub::{Hub, PublishedState};
+use super::bench::Bench;
+use super::hub::{Hub, PageCommand, PublishedState};
 use super::influx::Influx;
 use super::rate::{PUBLISH, Rate};
 use super::show::{self, HeadInputs, SourceJson};
 use super::told::Limits;
 use super::world::World;
-use crate::duplex::{self, Port};
+use crate::duplex::{self, Duplex};
 use crate::endpoint::Endpoint;
 use crate::interrupt;
 
 /// Timeout of a read: the clock goes on.
 const SILENCE: Duration = Duration::from_millis(10);
-/// While no update is due: a wake-up for each message would cost several times the message. Radios and USB
-/// adapters gather as long.
+/// While no update is due: a wake-up for each message would cost several times the message.
 const GATHER: Duration = Duration::from_millis(20);
 /// Half of that time at 921,600 baud ends the gathering.
 const GATHERED_BYTES: usize = 1_024;
@@ -42,6 +42,8 @@ pub struct Feed {
     endpoint: Endpoint,
     link: Link,
     hub: Arc<Hub>,
+    commands: Receiver<PageCommand>,
+    bench: Option<Bench>,
     world: World,
     framer: Framer,
     influx: Option<Influx>,
@@ -55,11 +57,11 @@ pub struct Feed {
 }
 
 enum Link {
-    Open(Box<dyn Port>),
+    Open(Duplex),
     /// It is tried again at this time.
     Lost(Wall),
     /// Sent by a thread.
-    Opening(Receiver<Result<Box<dyn Port>>>),
+    Opening(Receiver<Result<Duplex>>),
 }
 
 impl Link {
@@ -68,20 +70,27 @@ impl Link {
         let endpoint = endpoint.clone();
         std::thread::Builder::new().name("opening".to_owned()).spawn(move || {
             // Nobody waits at the program's end.
-            let _ = opened.send(duplex::open(&endpoint, SILENCE).map(|duplex| duplex.reader));
+            let _ = opened.send(duplex::open(&endpoint, SILENCE));
         })?;
         Ok(Self::Opening(link))
     }
 }
 
 impl Feed {
-    /// An error in the name is reported at once.
-    pub fn open(endpoint: &Endpoint, limits: Limits, hub: Arc<Hub>, influx: Option<Influx>) -> Result<Self> {
-        let port = duplex::open(endpoint, SILENCE)?.reader;
+    /// Opens it.
+    pub fn open(
+        endpoint: &Endpoint,
+        limits: Limits,
+        (hub, commands): (Arc<Hub>, Receiver<PageCommand>),
+        bench: Option<Bench>,
+        influx: Option<Influx>,
+    ) -> Result<Self> {
         Ok(Self {
             endpoint: endpoint.clone(),
-            link: Link::Open(port),
+            link: Link::Open(duplex::open(endpoint, SILENCE)?),
             hub,
+            commands,
+            bench,
             world: World::new(limits),
             framer: Framer::new(),
             influx,
@@ -101,6 +110,7 @@ impl Feed {
         while !interrupt::requested() {
             let frames = self.world.frames;
             let got = self.read(&mut buffer);
+            self.check(buffer.get(..got).unwrap_or_default());
             let now = self.now();
             self.epoch_us = epoch_us(SystemTime::now(), now);
             self.pass(now);
@@ -123,12 +133,25 @@ impl Feed {
         Instant::from_micros(u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX))
     }
 
+    fn check(&mut self, received: &[u8]) {
+        let Self { link, bench: Some(bench), world, commands, .. } = self else { return };
+        let is_armed = world.crafts.values().any(|craft| craft.monitor.vehicle().armed());
+        while let Ok(command) = commands.try_recv() {
+            if let PageCommand::Check(system) = command {
+                bench.start(system);
+            }
+        }
+        if let Link::Open(duplex) = link {
+            bench.pass(received, is_armed, &mut duplex.writer);
+        }
+    }
+
     fn read(&mut self, buffer: &mut [u8]) -> usize {
-        let Link::Open(port) = &mut self.link else {
+        let Link::Open(Duplex { reader, .. }) = &mut self.link else {
             self.open_again();
             return 0;
         };
-        let got = match port.read_all(buffer) {
+        let got = match reader.read_all(buffer) {
             Ok(0) => Err("the other side has closed the connection".to_owned()),
             Ok(got) => Ok(got),
             Err(error) if duplex::is_silence(&error) => Ok(0),
@@ -189,8 +212,8 @@ impl Feed {
             _ => return std::thread::sleep(SILENCE),
         };
         match opened {
-            Ok(Ok(port)) => {
-                self.link = Link::Open(port);
+            Ok(Ok(duplex)) => {
+                self.link = Link::Open(duplex);
                 self.source.words = String::new();
             }
             Ok(Err(error)) => self.lose(format!("{error:#}")),
@@ -215,7 +238,8 @@ impl Feed {
             influx: self.influx.as_mut().map(Influx::figures),
         };
         let (head, crafts) = show::all(&self.world, now, &around);
-        self.hub.publish(PublishedState { epoch: 0, now, head, timeline: Arc::default(), crafts });
+        let aside = self.bench.as_ref().map_or_else(Arc::default, |bench| Arc::clone(&bench.shown));
+        self.hub.publish(PublishedState { epoch: 0, now, head, aside, crafts });
     }
 }
 
@@ -237,6 +261,18 @@ fn evenly(bytes: &[u8], from: Instant, to: Instant) -> impl Iterator<Item = (Ins
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn arming_ends_the_bench_check() {
+        let link = "udpin:127.0.0.1:1".parse().expect("a link");
+        let (mut bench, mut sent) = (Bench::new(crate::cli::Setup::of_page(link, 2)), Vec::new());
+        bench.start(Some(1));
+        while sent.is_empty() {
+            bench.pass(b"bytes", false, &mut sent);
+        }
+        bench.pass(b"", true, &mut sent);
+        assert!(bench.shown.contains("not checked: the vehicle is armed"), "{}", bench.shown);
+    }
 
     #[test]
     fn utc_is_right_after_the_computer_has_slept() {

@@ -6,6 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use hums_core::clock::Instant;
+use serde::Deserialize;
 
 use super::world::Histories;
 use crate::page::history::{Cursor, HistoryPart};
@@ -22,14 +23,15 @@ pub struct PublishedState {
     pub now: Instant,
     /// Source, time and vehicles.
     pub head: String,
-    /// The recording's time line; the same text until it changes.
-    pub timeline: Arc<str>,
+    /// A recording's time line, or a link's bench check; the same text until it changes.
+    pub aside: Arc<str>,
     /// Each vehicle by system id.
     pub crafts: Vec<(u8, String)>,
 }
 
-/// A request of a page; apart from the vehicle, only for playback.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A request of a page.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(tag = "cmd", content = "to", rename_all = "lowercase")]
 pub enum PageCommand {
     /// Stops time.
     Pause,
@@ -39,6 +41,8 @@ pub enum PageCommand {
     Seek(f64),
     /// Seconds of the recording per second.
     Speed(f64),
+    /// Bench check of this vehicle; `None`: the only one.
+    Check(Option<u8>),
 }
 
 /// The meeting place.

@@ -9,6 +9,7 @@
 //! to a database.
 
 pub mod assets;
+pub mod bench;
 pub mod board;
 pub mod companion;
 pub mod craft;
@@ -41,6 +42,7 @@ use std::time::SystemTime;
 use anyhow::{Context as _, Result, anyhow};
 use serde::Serialize;
 
+use self::bench::Bench;
 use self::feed::Feed;
 use self::guard::Guard;
 use self::hub::Hub;
@@ -74,7 +76,6 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     if let Some(page) = pages.first().filter(|_| args.open) {
         open(page);
     }
-    // Ctrl-C and SIGTERM end the follower; the server and its pages end with the program.
     let influx = follower.join().map_err(|_| {
         anyhow!("the reading of the vehicle failed by a fault of hums; start it again, and please report it")
     })??;
@@ -121,9 +122,13 @@ fn follow(
         if args.session.is_some() {
             return Err(usage("--session is for what was recorded: a log, a card or a folder"));
         }
-        let feed = Feed::open(&args.input, limits.clone(), hub, influx)?;
+        let bench = args.setup.map(|port| Bench::new(cli::Setup::of_page(args.input.clone(), port)));
+        let feed = Feed::open(&args.input, limits.clone(), (hub, commands), bench, influx)?;
         thread.spawn(move || Ok(feed.run()))
     } else {
+        if args.setup.is_some() {
+            return Err(usage("--setup is for a link to a box; a recording answers nothing"));
+        }
         let opened = recording::open(&args.input, args.session.as_deref())?;
         let name = opened.name.clone();
         let player = Player::new(&name, limits.clone(), hub, commands, influx);

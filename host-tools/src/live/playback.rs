@@ -341,18 +341,18 @@ impl Player {
                 }
                 self.source.phase = "playing";
             }
-            PageCommand::Speed(speed) if speed.is_finite() => {
-                self.source.speed = speed.clamp(SPEEDS.0, SPEEDS.1);
+            PageCommand::Speed(to) if to.is_finite() => {
+                self.source.speed = to.clamp(SPEEDS.0, SPEEDS.1);
             }
-            PageCommand::Seek(to_s) if to_s.is_finite() => {
-                let to = Instant::from_micros((to_s.max(0.0) * 1e6) as u64).clamp(loaded.start, loaded.end);
+            PageCommand::Seek(to) if to.is_finite() => {
+                let to = Instant::from_micros((to.max(0.0) * 1e6) as u64).clamp(loaded.start, loaded.end);
                 self.seek(to, loaded, world, now)?;
                 if self.source.phase == "ended" && to < loaded.end {
                     self.source.phase = "paused";
                 }
             }
-            // Nothing to pause, or an invalid time.
-            PageCommand::Pause | PageCommand::Speed(_) | PageCommand::Seek(_) => {}
+            // Nothing to pause, an invalid time, or a command for a link.
+            _ => {}
         }
         Ok(())
     }
@@ -397,8 +397,8 @@ impl Player {
             influx: self.influx.as_mut().map(Influx::figures) as Option<Figures>,
         };
         let (head, crafts) = show::all(world, now, &around);
-        let timeline = Arc::clone(&self.timeline);
-        self.hub.publish(PublishedState { epoch: self.epoch, now, head, timeline, crafts });
+        let aside = Arc::clone(&self.timeline);
+        self.hub.publish(PublishedState { epoch: self.epoch, now, head, aside, crafts });
     }
 }
 

@@ -11,12 +11,11 @@ use std::thread::{self, Builder};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
-use serde::Deserialize;
 
 use super::assets;
 use super::guard::Guard;
 use super::http::{self, Request};
-use super::hub::{Hub, PageCommand, PublishedState};
+use super::hub::{Hub, PublishedState};
 use crate::page::history::Cursor;
 use crate::page::json;
 
@@ -76,15 +75,6 @@ pub fn start(listener: TcpListener, hub: Arc<Hub>, guard: Guard) -> Result<()> {
     Ok(())
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(tag = "cmd", rename_all = "lowercase")]
-enum CommandJson {
-    Pause,
-    Play,
-    Seek { to: f64 },
-    Speed { to: f64 },
-}
-
 impl Server {
     fn answer(&self, stream: &mut TcpStream) -> io::Result<()> {
         stream.set_nodelay(true)?;
@@ -118,12 +108,8 @@ impl Server {
     }
 
     fn obey(&self, stream: &mut TcpStream, command: &[u8]) -> io::Result<()> {
-        let command = match serde_json::from_slice(command) {
-            Ok(CommandJson::Pause) => PageCommand::Pause,
-            Ok(CommandJson::Play) => PageCommand::Play,
-            Ok(CommandJson::Seek { to }) => PageCommand::Seek(to),
-            Ok(CommandJson::Speed { to }) => PageCommand::Speed(to),
-            Err(_) => return say(stream, "400 Bad Request", "This is no command.\n"),
+        let Ok(command) = serde_json::from_slice(command) else {
+            return say(stream, "400 Bad Request", "This is no command.\n");
         };
         if self.hub.command(command) {
             say(stream, "200 OK", "")
@@ -139,7 +125,7 @@ impl Server {
         };
         http::begin(stream, "text/event-stream")?;
         let vehicle = vehicle.and_then(|system| system.parse().ok());
-        let mut page = Page { vehicle, cursor: Cursor::default(), epoch: 0, timeline: Arc::default() };
+        let mut page = Page { vehicle, cursor: Cursor::default(), epoch: 0, aside: Arc::default() };
         let mut seen = 0;
         loop {
             let events = match self.hub.after(seen, COMMENT_EVERY) {
@@ -163,7 +149,7 @@ struct Page {
     vehicle: Option<u8>,
     cursor: Cursor,
     epoch: u64,
-    timeline: Arc<str>,
+    aside: Arc<str>,
 }
 
 impl Page {
@@ -180,9 +166,9 @@ impl Page {
             }
         };
         add(&published.head);
-        if !Arc::ptr_eq(&self.timeline, &published.timeline) && !published.timeline.is_empty() {
-            self.timeline = Arc::clone(&published.timeline);
-            add(&self.timeline);
+        if !Arc::ptr_eq(&self.aside, &published.aside) {
+            self.aside = Arc::clone(&published.aside);
+            add(&self.aside);
         }
         let wanted =
             self.vehicle.and_then(|wanted| published.crafts.iter().find(|(system, _)| *system == wanted));

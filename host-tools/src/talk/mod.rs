@@ -352,12 +352,8 @@ fn of_newest<T>(card: &Path, of_log: impl Fn(Contents) -> Option<T>) -> Result<O
         )));
     }
     let Ok(found) = find(&[card.to_owned()], false) else { return Ok(None) };
-    for place in found.places.iter().rev().filter(|place| place.own().is_some()) {
-        if let Some(found) = of_log(check::overview(place)?.contents) {
-            return Ok(Some(found));
-        }
-    }
-    Ok(None)
+    let mut logs = found.places.iter().rev().filter(|place| place.own().is_some());
+    logs.find_map(|log| check::overview(log).map(|found| of_log(found.contents)).transpose()).transpose()
 }
 
 /// This PC's time, as signatures count it.

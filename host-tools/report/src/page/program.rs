@@ -22,7 +22,7 @@ modules! {
     // The check in a browser, and its worker.
     "check" "worker"
     // The one that grows.
-    "bar" "compass" "condition" "esc" "gauge" "general" "health" "horizon" "keys" "link" "live" "movement" "player" "sound" "spark"
+    "bar" "bench" "compass" "condition" "esc" "gauge" "general" "health" "horizon" "keys" "link" "live" "movement" "player" "sound" "spark"
 }
 
 /// uPlot 1.6.32, MIT (`assets/uPlot.LICENSE`).

@@ -65,10 +65,11 @@ pub(super) fn prearm(client: &mut Client) -> Result<CheckLine> {
     Ok(line("checks", text.starts_with(READY), text.trim_start_matches("HUMS: ")))
 }
 
+/// Takes the image's `board` if none is known.
 pub(super) fn recorded(
     client: Client,
     own: &BoxSettings,
-    board: Option<&Board>,
+    board: &mut Option<&'static Board>,
     heard: Option<HeardAutopilot>,
 ) -> Result<Vec<CheckLine>> {
     let checks = pull::newest(client, HEAD_SECTORS, |newest| {
@@ -79,6 +80,7 @@ pub(super) fn recorded(
         let mut checks = Vec::new();
         if let Some(boot) = boot.or_else(|| end.contents.boot.clone()) {
             let is_it = board.is_none_or(|board| board.name == boot.board);
+            *board = board.or_else(|| hums_boards::find(&boot.board).ok());
             checks.push(line("image", is_it, format!("{} {} for {}", boot.version, boot.git, boot.board)));
         }
         let lost = end.contents.stats.map_or(0, |stats| stats.frames_lost);

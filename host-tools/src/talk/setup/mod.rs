@@ -1,8 +1,7 @@
 //! `hums box setup`: the wiring of a board, the autopilot's settings for it, and a bench check.
 //!
-//! The settings are those of `docs/wiring.md`, of the autopilot's telemetry port `--port`. The autopilot answers over its own USB
-//! or radio link, or through the box while `GS_PASS` is 1. The bench check reads both ends of the log that the box records
-//! now: so the messages and rates are those that the box received.
+//! The autopilot answers over its own link, or through the box while `GS_PASS` is 1. The bench check reads the log that the
+//! box records now: messages and rates are those that the box received.
 
 mod bench;
 mod settings;
@@ -17,9 +16,10 @@ use hums_link::packet::Fields;
 use serde::Serialize;
 
 use self::settings::Setting;
-use super::{Client, params};
+use super::{Client, LISTEN, params};
 use crate::cli;
 use crate::colour::level;
+use crate::duplex::Duplex;
 use crate::mavlink::ids::HEARTBEAT;
 use crate::outcome::{Outcome, usage};
 use crate::output::{self, Schema};
@@ -37,15 +37,17 @@ const ARMED: u8 = 0x80;
 /// Three heartbeats.
 const HEARTBEATS: Duration = Duration::from_secs(3);
 const TRIES: usize = 3;
+const HEARD: [u8; 2] = [COMPONENT, AUTOPILOT];
 /// What to check if the box is not heard.
 const SILENT: &str =
     "no message of the box: check its LED, its supply, the wires to the autopilot, and the port's rate";
 
+/// The result.
 #[derive(Debug, Serialize)]
-struct SetupJson {
+pub struct SetupJson {
     /// MAVLink system id of the box's vehicle.
     system: u8,
-    /// Of the board of `--board`.
+    /// Of the board of `--board`, else of the image's.
     wiring: Vec<Wiring>,
     /// Parameters of the autopilot; empty if it is not heard on the link.
     settings: Vec<Setting>,
@@ -53,6 +55,22 @@ struct SetupJson {
     checks: Vec<CheckLine>,
     /// No check is `missing`.
     ready: bool,
+}
+
+impl SetupJson {
+    /// On an open link.
+    pub fn on(duplex: Duplex, args: &cli::Setup) -> Result<Self> {
+        let listen = if args.at.system.is_some() { Duration::ZERO } else { LISTEN };
+        let client = Client::over(duplex, None).found(&args.at, &HEARD, listen).context(SILENT)?;
+        check(client, args, None)
+    }
+
+    /// The last line.
+    pub fn verdict(&self) -> String {
+        let missing = self.checks.iter().filter(|check| check.state == "missing");
+        let missing: Vec<&str> = missing.map(|check| check.check).collect();
+        if self.ready { "ready to fly".to_owned() } else { format!("not ready: {}", missing.join(", ")) }
+    }
 }
 
 /// A wire or a part of the board.
@@ -119,7 +137,21 @@ pub fn run(args: &cli::Setup) -> Result<Outcome> {
         let values = settings::values_of(file)?;
         return settings::restore(&mut Client::connect_to(&args.at, &[AUTOPILOT])?, &values);
     }
-    let mut client = Client::connect_to(&args.at, &[COMPONENT, AUTOPILOT]).context(SILENT)?;
+    let found = check(Client::connect_to(&args.at, &HEARD).context(SILENT)?, args, board)?;
+    if args.json {
+        output::json(SCHEMA, &found)?;
+    } else {
+        let mut table = Table::new(2, [left(7), left(0), left(0)]);
+        for CheckLine { check, state, detail } in &found.checks {
+            let state = level(if *state == "missing" { "MISSING" } else { state }).to_string();
+            table.row([state, (*check).to_owned(), word(detail).into_owned()]);
+        }
+        output::line(&format!("bench check\n{}\n{}", table.text(), found.verdict()))?;
+    }
+    Ok(if found.ready { Outcome::Done } else { Outcome::Findings })
+}
+
+fn check(mut client: Client, args: &cli::Setup, mut board: Option<&'static Board>) -> Result<SetupJson> {
     let (system, found) = client.target();
     let is_silent = found != COMPONENT;
     let own = BoxSettings::of(|param| {
@@ -128,12 +160,9 @@ pub fn run(args: &cli::Setup) -> Result<Outcome> {
     })?;
     client.turn_to(AUTOPILOT);
     let heard = autopilot(&mut client)?;
-    let mut settings = match heard {
-        Some(heard) => settings::wanted(&mut client, heard.autopilot, args.port, &own)?,
-        None => Vec::new(),
-    };
-    if args.set {
-        let file = args.undo.as_deref().context("--set needs --undo FILE, for the former values")?;
+    let wanted = |heard: HeardAutopilot| settings::wanted(&mut client, heard.autopilot, args.port, &own);
+    let mut settings = heard.map_or_else(|| Ok(Vec::new()), wanted)?;
+    if let Some(file) = &args.undo {
         settings::change(&mut client, &mut settings, file)?;
     }
     if !args.json {
@@ -146,26 +175,11 @@ pub fn run(args: &cli::Setup) -> Result<Outcome> {
         checks[0] = line("box", false, detail);
     } else {
         let ready = bench::prearm(&mut client)?;
-        checks.extend(bench::recorded(client, &own, board, heard)?);
+        checks.extend(bench::recorded(client, &own, &mut board, heard)?);
         checks.push(ready);
     }
-    let missing: Vec<&str> =
-        checks.iter().filter(|check| check.state == "missing").map(|check| check.check).collect();
-    let is_ready = missing.is_empty();
-    if args.json {
-        let wiring = board.map_or_else(Vec::new, wiring);
-        output::json(SCHEMA, &SetupJson { system, wiring, settings, checks, ready: is_ready })?;
-    } else {
-        let mut table = Table::new(2, [left(7), left(0), left(0)]);
-        for CheckLine { check, state, detail } in &checks {
-            let state = level(if *state == "missing" { "MISSING" } else { state }).to_string();
-            table.row([state, (*check).to_owned(), word(detail).into_owned()]);
-        }
-        output::line(&format!("bench check\n{}", table.text()))?;
-        let words = missing.join(", ");
-        output::line(&if is_ready { "ready to fly".to_owned() } else { format!("not ready: {words}") })?;
-    }
-    Ok(if is_ready { Outcome::Done } else { Outcome::Findings })
+    let ready = checks.iter().all(|check| check.state != "missing");
+    Ok(SetupJson { system, wiring: board.map_or_else(Vec::new, wiring), settings, checks, ready })
 }
 
 fn wiring(board: &Board) -> Vec<Wiring> {

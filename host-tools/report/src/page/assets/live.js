@@ -1,6 +1,7 @@
 // The page of a flight that grows: what comes from hums goes to the instruments and plots, at most once a frame.
 
 import { badge } from "./badge.js";
+import { bench } from "./bench.js";
 import { condition } from "./condition.js";
 import { attribute, say, toggle } from "./dom.js";
 import { el } from "./elements.js";
@@ -86,6 +87,7 @@ const linked = (now, count, token) => {
   stir();
 };
 const wire = connect(take, linked, () => speaker.on);
+const check = bench(() => wire.send({ cmd: "check", to: state?.vehicle ?? null }), () => head?.source.name ?? "SRC");
 const time = player((command) => wire.send(command), stir);
 const go = (at) => {
   if (!time.recording) lookAt(at);
@@ -96,6 +98,7 @@ const log = notes({ go, newestFirst: true, rows: 200 }),
   told = parameters();
 document.getElementById("player").append(time.node);
 const notice = document.getElementById("notice");
+notice.after(check.node);
 for (const { node } of rows) {
   bar.append(el("a", { href: `#${node.id}` }, node.firstChild.textContent));
   body.append(node);
@@ -131,7 +134,8 @@ function take(message, text) {
   else if (message.t === "state") {
     state = message;
     time.keep(message, text);
-  } else if (message.t === "timeline") marks = message.marks;
+  } else if (message.t === "bench") check.take(message);
+  else if (message.t === "timeline") marks = message.marks;
   else if (message.t === "history") {
     if (message.reset) {
       anew = true;
@@ -280,6 +284,7 @@ const drawState = () => {
 function draw() {
   dirty = false;
   toggle(root, "unknown", !state);
+  check.update(connected && !state?.armed);
   if (head) drawHead();
   else if (!connected && failures > 1) {
     notice.hidden = false;
