@@ -61,8 +61,7 @@ impl SetupJson {
     /// On an open link.
     pub fn on(duplex: Duplex, args: &cli::Setup) -> Result<Self> {
         let listen = if args.at.system.is_some() { Duration::ZERO } else { LISTEN };
-        let client = Client::over(duplex, None).found(&args.at, &HEARD, listen).context(SILENT)?;
-        check(client, args, None)
+        check(Client::over(duplex, None).found(&args.at, &HEARD, listen).context(SILENT)?, args, None)
     }
 
     /// The last line.
