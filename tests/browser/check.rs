@@ -236,8 +236,7 @@ fn the_reports_are_those_of_the_command_line_also_of_a_card_and_side_by_side() {
     }
     let packed = ["decode", "--format", "hum", "-o", "d.hum"];
     hums_in(&folder, &packed, &[own("ap_quad_guided.tlog").display().to_string()]).expect_code(&[0]);
-    let names: Vec<String> =
-        ["a.tlog", "b.bin.gz", "c.ulg.gz", "card.img", "d.hum"].map(str::to_owned).into();
+    let names = ["a.tlog", "b.bin.gz", "c.ulg.gz", "card.img", "d.hum"].map(str::to_owned);
     let paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     page.check("#files", &paths);
     for name in &names {
