@@ -188,14 +188,14 @@ fn logs_without_an_id_are_of_the_vehicle_of_their_folder_or_of_the_one_that_is_n
 #[test]
 fn a_shared_copy_says_how_many_of_how_many_were_removed() {
     let dir = tempfile::tempdir().expect("directory");
-    let told = text(&run(
-        dir.path(),
-        &format!("share {} -o shared.tlog", flight("ap_quad_guided.tlog").display()),
-        0,
-    ));
-    let removed: Vec<(u64, u64, &str)> = told
-        .lines()
-        .filter_map(|line| line.strip_prefix("removed: "))
+    fs::create_dir(dir.path().join("logs")).expect("a folder");
+    fs::copy(flight("ap_quad_guided.tlog"), dir.path().join("logs/flown.tlog")).expect("copied");
+    fs::write(dir.path().join("logs/notes.txt"), "windy").expect("written");
+    let said = run(dir.path(), "share logs -o shared.tlog", 0);
+    let (told, remarks) = (text(&said), String::from_utf8_lossy(&said.stderr));
+    assert!(remarks.contains("logs: 1 file passed over"), "{remarks}");
+    let lines = told.lines().filter_map(|line| line.strip_prefix("removed: "));
+    let removed: Vec<(u64, u64, &str)> = lines
         .map(|line| {
             let (part, rest) = line.split_once(" of ").expect("a part");
             let (all, what) = rest.split_once(' ').expect("of what");
