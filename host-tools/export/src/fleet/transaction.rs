@@ -208,9 +208,9 @@ impl SyncedChange {
         let lines = |lines: &mut dyn Iterator<Item = &String>| {
             lines.fold(String::new(), |text, line| text + line + "\n")
         };
-        let lists =
-            [(REPLACED, lines(&mut replaced.iter().copied())), (COMPACTED, lines(&mut compacted.iter()))];
-        for (name, text) in lists.into_iter().filter(|(_, text)| !text.is_empty()) {
+        for (name, text) in
+            [(REPLACED, lines(&mut replaced.iter().copied())), (COMPACTED, lines(&mut compacted.iter()))]
+        {
             stop::step()?;
             let mut file = File::create(part.path().join(name))?;
             file.write_all(text.as_bytes())?;
@@ -227,16 +227,10 @@ impl SyncedChange {
     }
 }
 
-/// An empty list has no file.
-fn read_list(path: &Path) -> io::Result<String> {
-    let list = fs::read_to_string(path);
-    list.or_else(|error| if error.kind() == io::ErrorKind::NotFound { Ok(String::new()) } else { Err(error) })
-}
-
 /// Applies a change; each of its steps may have been done before.
 fn apply(root: &Path, folder: &Path) -> io::Result<()> {
     let files = folder.join(FILES);
-    let replaced = read_list(&folder.join(REPLACED))?;
+    let replaced = fs::read_to_string(folder.join(REPLACED))?;
     if let Some(place) = replaced.lines().find(|place| !is_inside(place)) {
         return Err(io::Error::other(format!(
             "{}: wants to remove {place}, which is outside of the tables; if it is not your own, delete this folder",
@@ -262,7 +256,7 @@ fn apply(root: &Path, folder: &Path) -> io::Result<()> {
         }
     }
     // A session twice in the index is harmless.
-    for session in read_list(&folder.join(COMPACTED))?.lines() {
+    for session in fs::read_to_string(folder.join(COMPACTED))?.lines() {
         let index = root.join(OWN).join(COMPACTED);
         fs::create_dir_all(&index)?;
         let mut index = File::options().create(true).append(true).open(index.join(shard(session)))?;
