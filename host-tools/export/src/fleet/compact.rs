@@ -232,7 +232,7 @@ fn of_table(transaction: &Transaction, place: &str, paths: &[PathBuf]) -> Result
             );
         }
         sum = (sum.0 + 1, sum.1 + file.metadata()?.len());
-        transaction.end_file(file);
+        transaction.end_file(file)?;
     }
     Ok(sum)
 }

@@ -11,7 +11,6 @@
 
 pub(crate) mod bucket;
 pub mod compact;
-mod disk;
 pub mod overview;
 pub(crate) mod sessions;
 #[cfg(test)]
@@ -200,7 +199,6 @@ fn names_of(folder: &Path, is_wanted: impl Fn(&DirEntry) -> bool) -> Result<Vec<
 pub(crate) struct Session {
     transaction: Transaction,
     root: PathBuf,
-    is_local: bool,
     partition: String,
     name: String,
 }
@@ -217,8 +215,8 @@ impl Session {
             fleet.check(&name, &found, &context.inputs)?;
         }
         let partition = partition(&identity.vehicle, identity.date.as_deref());
-        let (root, is_local) = (fleet.shown(""), fleet.bucket.is_none());
-        Ok(Self { transaction: Transaction::begin(&fleet.root)?, root, is_local, partition, name })
+        let root = fleet.shown("");
+        Ok(Self { transaction: Transaction::begin(&fleet.root)?, root, partition, name })
     }
 
     fn place(&self, table: &str, part: u32) -> String {
@@ -235,11 +233,8 @@ impl Session {
         file.with_context(|| cannot_write(&self.path(table, part)))
     }
 
-    pub(crate) fn end_file(&self, file: File) {
-        // A bucket's server does that.
-        if self.is_local {
-            self.transaction.end_file(file);
-        }
+    pub(crate) fn end_file(&self, file: File) -> Result<()> {
+        self.transaction.end_file(file)
     }
 
     /// All files are there and closed: they take their places. Of two recordings of one session in one call the longer one
@@ -276,7 +271,7 @@ impl Session {
         context: &Context,
         frames: u64,
     ) -> Result<Option<Vec<PathBuf>>> {
-        let Self { transaction, root, partition, name, .. } = self;
+        let Self { transaction, root, partition, name } = self;
         let places = transaction.places()?;
         let lease = bucket.lease(&name, &places, None)?;
         let found = fleet.find(&name)?;

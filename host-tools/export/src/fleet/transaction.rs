@@ -9,14 +9,16 @@
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Write as _};
+use std::mem;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
 use tempfile::TempDir;
 
-use super::disk::Syncs;
 use super::{names, shard};
 use crate::files::{check_parent, settle};
+use crate::logs::in_order::in_order;
 use crate::storage::is_inside;
 
 /// The folder of this program in a fleet's folder. Readers of tables ignore names with a dot.
@@ -126,12 +128,18 @@ fn is_begun(name: &str) -> bool {
     name.starts_with(COMMIT) && !name.ends_with(PART)
 }
 
+/// File systems with a journal write one entry for all files that wait.
+const SYNCS_AT_ONCE: usize = 8;
+/// Files of a change that wait: systems limit a program's open files.
+const OPEN_MAX: usize = 48;
+
 /// A change that does not count yet. Dropped, it leaves nothing.
 #[derive(Debug)]
 pub(crate) struct Transaction {
     root: PathBuf,
+    /// Complete, and not on the disk yet.
+    ended: Mutex<Vec<File>>,
     part: TempDir,
-    syncs: Syncs,
 }
 
 /// A change with all of its new files on the disk.
@@ -147,7 +155,7 @@ impl Transaction {
         let part = fs::create_dir_all(&own)
             .and_then(|()| tempfile::Builder::new().prefix(".").suffix(PART).tempdir_in(&own))
             .and_then(|part| fs::create_dir(part.path().join(FILES)).map(|()| part));
-        Ok(Self { root: root.to_owned(), part: settle(part, root)?, syncs: Syncs::default() })
+        Ok(Self { root: root.to_owned(), ended: Mutex::default(), part: settle(part, root)? })
     }
 
     pub(crate) fn path(&self, place: &str) -> PathBuf {
@@ -158,17 +166,26 @@ impl Transaction {
         settle(places_in(&self.part.path().join(FILES)), &self.root)
     }
 
-    /// A complete file goes to the disk: a change that counts must have it after a power cut.
-    pub(crate) fn end_file(&self, file: File) {
-        self.syncs.add(file);
+    /// A change that counts must have its complete files after a power cut.
+    pub(crate) fn end_file(&self, file: File) -> Result<()> {
+        let mut ended = self.ended.lock().unwrap_or_else(PoisonError::into_inner);
+        ended.push(file);
+        if ended.len() < OPEN_MAX { Ok(()) } else { self.sync_files(mem::take(&mut ended)) }
     }
 
-    /// Waits until all ended files are on the disk. Other changes may be made meanwhile.
+    fn sync_files(&self, files: Vec<File>) -> Result<()> {
+        let mut files = files.into_iter();
+        // It closes each file too.
+        let sync = |file: File| file.sync_all();
+        in_order(SYNCS_AT_ONCE, OPEN_MAX, || Ok(files.next()), sync, |synced| settle(synced, &self.root))
+    }
+
+    /// All ended files are on the disk after it. Other changes may be made meanwhile.
     pub(crate) fn sync(self) -> Result<SyncedChange> {
+        let files = mem::take(&mut *self.ended.lock().unwrap_or_else(PoisonError::into_inner));
+        self.sync_files(files)?;
         let places = self.places()?;
-        let Self { root, part, syncs } = self;
-        settle(syncs.end(), &root)?;
-        Ok(SyncedChange { root, part, places })
+        Ok(SyncedChange { root: self.root, part: self.part, places })
     }
 }
 

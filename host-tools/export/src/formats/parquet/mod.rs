@@ -367,8 +367,7 @@ impl TableFile {
         let file = writer
             .into_inner()
             .and_then(|file| Ok(file.0.into_inner().map_err(IntoInnerError::into_error)?));
-        session.end_file(file.with_context(|| cannot_write(&path))?);
-        Ok(())
+        session.end_file(file.with_context(|| cannot_write(&path))?)
     }
 }
 
