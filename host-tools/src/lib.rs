@@ -39,14 +39,23 @@ use outcome::Outcome;
 /// The first argument is the program's name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::no_end_by_file_size();
-    match Cli::try_parse_from(with_command(arguments.into_iter().collect())) {
+    let given: Vec<OsString> = arguments.into_iter().collect();
+    let count = given.len();
+    let arguments = with_command(given);
+    let lacks_command = arguments.len() > count;
+    let code = match Cli::try_parse_from(arguments) {
         Ok(mut cli) => outcome::exit_code(fetched(&mut cli.command)),
         Err(error) => {
             // Help and version succeed; so does output to a reader that has gone.
             let _ = error.print();
             ExitCode::from(if error.use_stderr() { 2 } else { 0 })
         }
+    };
+    // Dropped files.
+    if lacks_command {
+        hums_base::console::hold();
     }
+    code
 }
 
 /// Adds `check` before files, standard input, `--`, and flags of `check`.

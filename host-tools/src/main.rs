@@ -3,7 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let code = hums::run(std::env::args_os());
-    hums_base::console::hold();
-    code
+    hums::run(std::env::args_os())
 }

@@ -154,6 +154,7 @@ impl Release {
         for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
             files.push(read(licence, &self.tree.join(licence))?);
         }
+        files.push(("README.txt".to_owned(), include_bytes!("release.txt").to_vec()));
         files.push(("BUILD".to_owned(), self.provenance()?.into_bytes()));
         files.push(("SHA256SUMS".to_owned(), sums(&files).into_bytes()));
         Ok(files)
@@ -226,7 +227,8 @@ impl Release {
     fn provenance(&self) -> Result<String> {
         let rustc = Shell::new(env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()));
         let rustc = rustc.args(["--version", "--verbose"]).output()?;
-        Ok(format!("commit {}\n{rustc}command cargo xtask dist\n", self.commit))
+        let key = if self.key.is_some() { " --key FILE" } else { "" };
+        Ok(format!("commit {}\n{rustc}command cargo xtask dist{key}\n", self.commit))
     }
 }
 

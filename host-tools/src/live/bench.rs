@@ -23,6 +23,7 @@ const SILENCE: Duration = Duration::from_millis(20);
 pub struct Bench {
     args: cli::Setup,
     running: Option<Running>,
+    has_result: bool,
     /// For the pages.
     pub shown: Arc<str>,
 }
@@ -45,12 +46,13 @@ struct BenchJson {
 impl Bench {
     /// Not begun.
     pub fn new(args: cli::Setup) -> Self {
-        let mut bench = Self { args, running: None, shown: Arc::default() };
+        let mut bench = Self { args, running: None, has_result: false, shown: Arc::default() };
         bench.show("not checked".to_owned(), None);
         bench
     }
 
     fn show(&mut self, words: String, found: Option<SetupJson>) {
+        self.has_result = found.is_some();
         self.shown = json(&BenchJson { t: "bench", words, found, port: self.args.port }).into();
     }
 
@@ -69,15 +71,20 @@ impl Bench {
         self.show(words.to_owned(), None);
     }
 
-    /// Passes bytes on. Arming ends the check.
-    pub fn pass(&mut self, received: &[u8], is_armed: bool, link: &mut dyn Write) {
+    /// Passes bytes on, to a `link` on which an arming would have been heard. Arming ends the check and its result.
+    pub fn pass(&mut self, received: &[u8], is_armed: bool, link: Option<&mut dyn Write>) {
+        if is_armed && self.has_result {
+            self.show("not checked since the last arming".to_owned(), None);
+        }
         let Some(running) = self.running.take() else { return };
         if !is_armed && !running.thread.is_finished() {
-            // Feed reports errors of the link.
             let mut pieces = received.chunks(PIECE_BYTES);
             let _ = pieces.try_for_each(|piece| running.received.send(piece.to_vec()));
-            let _ = running.sent.try_iter().try_for_each(|bytes| link.write_all(&bytes));
-            self.running = Some(running);
+            let mut sent = running.sent.try_iter();
+            match link.map_or(Ok(()), |link| sent.try_for_each(|bytes| link.write_all(&bytes))) {
+                Ok(()) => self.running = Some(running),
+                Err(error) => self.show(format!("not checked: the link takes nothing: {error}"), None),
+            }
             return;
         }
         let found = if is_armed { Ok(Err(anyhow!("the vehicle is armed"))) } else { running.thread.join() };

@@ -51,6 +51,8 @@ pub struct Feed {
     start: Wall,
     /// UTC at `start`, see [`epoch_us`].
     epoch_us: u64,
+    /// The first bytes.
+    first: Option<Wall>,
     heard: Option<Wall>,
     looked: Instant,
     rate: Rate,
@@ -97,6 +99,7 @@ impl Feed {
             source: SourceJson { name: endpoint.to_string(), phase: "waiting", ..SourceJson::default() },
             start: Wall::now(),
             epoch_us: epoch_us(SystemTime::now(), Instant::ZERO),
+            first: None,
             heard: None,
             looked: Instant::ZERO,
             rate: Rate::default(),
@@ -134,16 +137,19 @@ impl Feed {
     }
 
     fn check(&mut self, received: &[u8]) {
-        let Self { link, bench: Some(bench), world, commands, .. } = self else { return };
+        let Self { link, bench: Some(bench), world, commands, first, .. } = self else { return };
         let is_armed = world.crafts.values().any(|craft| craft.monitor.vehicle().armed());
         while let Ok(command) = commands.try_recv() {
             if let PageCommand::Check(system) = command {
                 bench.start(system);
             }
         }
-        if let Link::Open(duplex) = link {
-            bench.pass(received, is_armed, &mut duplex.writer);
+        let Link::Open(duplex) = link else { return };
+        if !received.is_empty() {
+            first.get_or_insert_with(Wall::now);
         }
+        let knows_arming = first.is_some_and(|first| first.elapsed() >= SILENT);
+        bench.pass(received, is_armed, knows_arming.then_some(&mut duplex.writer));
     }
 
     fn read(&mut self, buffer: &mut [u8]) -> usize {
@@ -268,9 +274,9 @@ mod tests {
         let (mut bench, mut sent) = (Bench::new(crate::cli::Setup::of_page(link, 2)), Vec::new());
         bench.start(Some(1));
         while sent.is_empty() {
-            bench.pass(b"bytes", false, &mut sent);
+            bench.pass(b"bytes", false, Some(&mut sent));
         }
-        bench.pass(b"", true, &mut sent);
+        bench.pass(b"", true, Some(&mut sent));
         assert!(bench.shown.contains("not checked: the vehicle is armed"), "{}", bench.shown);
     }
 

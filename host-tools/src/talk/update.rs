@@ -27,13 +27,14 @@ const SCHEMA: Schema = Schema::first("hums-box-update");
 struct UpdateJson {
     /// Of the file.
     board: String,
+    #[serde(rename = "firmware_version")]
     version: String,
     commit: String,
     /// Signed by the test key, which only development builds take.
     is_test: bool,
     /// Of the newest log on the card.
     box_version: Option<String>,
-    /// Whether an image to fall back to is on the card.
+    /// Whether an image to go back to is on the card: another one for the same board, with a good signature.
     has_previous: bool,
     /// On the card.
     file: PathBuf,
@@ -69,7 +70,7 @@ pub fn run(args: &cli::Update) -> Result<Outcome> {
         commit: header.commit().to_owned(),
         is_test,
         box_version: newest.map(|newest| newest.version),
-        has_previous: args.card.join(PREVIOUS).exists(),
+        has_previous: has_previous(&args.card, &header),
         file,
     };
     if args.json {
@@ -81,9 +82,12 @@ pub fn run(args: &cli::Update) -> Result<Outcome> {
     if is_test {
         output::line("It is signed by the test key: only a box with a development build takes it.")?;
     }
+    if update.box_version.is_none() {
+        output::line("No log on this card: board and version were not compared with those of the box.")?;
+    }
     if !update.has_previous {
         output::line(
-            "The card has no HUMS.OLD: if the update fails, the box has no other version to go back to.",
+            "The card has no HUMS.OLD for this board: if the update fails, the box has no other version to go back to.",
         )?;
     }
     output::line(
@@ -107,6 +111,11 @@ fn judge(bytes: &[u8]) -> Result<Header, &'static str> {
         check.finish()
     });
     good.map(|()| header).map_err(|_| "is damaged or forged: its signature does not fit")
+}
+
+fn has_previous(card: &Path, header: &Header) -> bool {
+    let previous = fs::read(card.join(PREVIOUS)).ok().and_then(|bytes| judge(&bytes).ok());
+    previous.is_some_and(|previous| previous.board() == header.board() && !header.has_image_of(&previous))
 }
 
 struct Newest {

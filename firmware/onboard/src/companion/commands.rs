@@ -241,6 +241,9 @@ fn format(now: Instant, by: By, book: &mut Logbook<'_>, sectors: &mut SectorsIn)
 
 fn preflight(monitor: &Monitor) -> Option<(&'static str, u8)> {
     let bad = |level| matches!(level, Level::Warning | Level::Critical);
+    if monitor.vehicle().armed() {
+        return Some(("armed", 0));
+    }
     monitor.health().levels().find(|(_, _, level)| bad(*level)).map(|(check, part, _)| (check.name, part))
 }
 

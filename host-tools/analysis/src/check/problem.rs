@@ -271,9 +271,12 @@ impl Problems {
         }
     }
 
+    /// Explains the first occurrence, whose time is shown.
     pub(super) fn event(&mut self, check: &str, words: &str) {
         self.detail(check, words);
-        if let Some(OpenProblem { problem, .. }) = self.open.get_mut(&(check.to_owned(), 0)) {
+        if let Some(OpenProblem { problem, .. }) = self.open.get_mut(&(check.to_owned(), 0))
+            && problem.times == 1
+        {
             problem.event.get_or_insert_with(|| words.to_owned());
         }
     }

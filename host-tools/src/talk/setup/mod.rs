@@ -66,9 +66,15 @@ impl SetupJson {
 
     /// The last line.
     pub fn verdict(&self) -> String {
-        let missing = self.checks.iter().filter(|check| check.state == "missing");
-        let missing: Vec<&str> = missing.map(|check| check.check).collect();
-        if self.ready { "ready to fly".to_owned() } else { format!("not ready: {}", missing.join(", ")) }
+        let names = |state| {
+            let checks = self.checks.iter().filter(|check| check.state == state).map(|check| check.check);
+            checks.collect::<Vec<_>>().join(", ")
+        };
+        match (self.ready, names("unknown")) {
+            (false, _) => format!("not ready: {}", names("missing")),
+            (true, unknown) if unknown.is_empty() => "ready to fly".to_owned(),
+            (true, unknown) => format!("ready to fly, but not known: {unknown}"),
+        }
     }
 }
 

@@ -43,7 +43,7 @@ export const bench = (start, link) => {
       told = message;
       const { words, found: result, port } = told,
         isRunning = words === "checking";
-      verdict.set(!result ? "stale" : result.ready ? "ok" : "critical", words);
+      verdict.set(!result ? "stale" : result.ready ? "ok" : "critical", result ? `system ${result.system}: ${words}` : words);
       say(button, isRunning ? "Checking" : "Check");
       button.disabled = isRunning;
       found.replaceChildren(...(result ? parts(result, port, link()).filter(Boolean) : []));
