@@ -27,8 +27,7 @@ const SCHEMA: Schema = Schema::first("hums-box-update");
 struct UpdateJson {
     /// Of the file.
     board: String,
-    #[serde(rename = "firmware_version")]
-    version: String,
+    firmware_version: String,
     commit: String,
     /// Signed by the test key, which only development builds take.
     is_test: bool,
@@ -66,7 +65,7 @@ pub fn run(args: &cli::Update) -> Result<Outcome> {
     let is_test = keys::TEST.starts_with(&header.key);
     let update = UpdateJson {
         board: header.board().to_owned(),
-        version,
+        firmware_version: version,
         commit: header.commit().to_owned(),
         is_test,
         box_version: newest.map(|newest| newest.version),
@@ -77,7 +76,7 @@ pub fn run(args: &cli::Update) -> Result<Outcome> {
         output::json(SCHEMA, &update)?;
         return Ok(Outcome::Done);
     }
-    let UpdateJson { board, version, commit, file, .. } = &update;
+    let UpdateJson { board, firmware_version: version, commit, file, .. } = &update;
     output::line(&format!("{}: version {version} ({commit}) for {board}, signature good", file.display()))?;
     if is_test {
         output::line("It is signed by the test key: only a box with a development build takes it.")?;
