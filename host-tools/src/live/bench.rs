@@ -71,7 +71,7 @@ impl Bench {
         self.show(words.to_owned(), None);
     }
 
-    /// Passes bytes on, to a `link` on which an arming would have been heard. Arming ends the check and its result.
+    /// Passes bytes on; `link` is there once an arming is known. Arming ends check and result.
     pub fn pass(&mut self, received: &[u8], is_armed: bool, link: Option<&mut dyn Write>) {
         if is_armed && self.has_result {
             self.show("not checked since the last arming".to_owned(), None);

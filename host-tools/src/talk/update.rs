@@ -33,7 +33,7 @@ struct UpdateJson {
     is_test: bool,
     /// Of the newest log on the card.
     box_version: Option<String>,
-    /// Whether an image to go back to is on the card: another one for the same board, with a good signature.
+    /// Whether the card has another image for the same board, with a good signature.
     has_previous: bool,
     /// On the card.
     file: PathBuf,
