@@ -27,7 +27,7 @@ fn role(arg: &Arg) -> Role {
         | "command" | "card_size" | "cut_after_writes" | "cut_store_after" | "folder" | "format" | "from"
         | "influx" | "last" | "line_rate" | "link" | "listen" | "listen_token" | "map" | "message"
         | "name" | "names" | "noise" | "offset" | "org" | "provoke" | "reboot_at_us" | "seed" | "session"
-        | "shell" | "span" | "speed" | "split" | "stall" | "system" | "to" | "token" | "value"
+        | "setup" | "shell" | "span" | "speed" | "split" | "stall" | "system" | "to" | "token" | "value"
         | "vehicle" | "write_error"
         // A file that exists is refused.
         | "undo" => Role::Other,

@@ -82,6 +82,8 @@ pub fn run(fleet: &Fleet) -> Result<String> {
     let ratio = compare(fleet, &stretches, dir, &mut text)?;
     let bytes = if fleet.is_short { None } else { Some(size(dir, &mut text)?) };
     let cost = ingest(fleet, &stretches, dir, &mut text)?;
+    // An engine may fail, and the figures were an hour's work.
+    eprint!("{text}");
     let query_s = ask(fleet, dir, &mut text)?;
     year(fleet, &cost, bytes, query_s, &mut text);
     // The speed of a short run is of the machine's other work.
@@ -167,8 +169,7 @@ fn compare(fleet: &Fleet, stretches: &[Stretch], dir: &Path, text: &mut String) 
         "ingest of {} sessions in one call: {now_s:.2} s, {before_s:.2} s before: {ratio:.2} times as fast",
         fleet.compared
     );
-    [files, one, all].iter().try_for_each(fs::remove_dir_all)?;
-    Ok(Some(ratio))
+    [files, one, all].iter().try_for_each(fs::remove_dir_all).map(|()| Some(ratio)).map_err(Into::into)
 }
 
 /// Different recordings of one vehicle: logs of the box, and their compacted tables. Returns bytes of these for each recording.
