@@ -20,10 +20,11 @@ use crate::gnss_velocity_residual::GnssVelocity;
 use crate::imu_gnss::ImuGnssResidual;
 use crate::latest::Reading;
 use crate::mag_heading_residual::{self, CompassUse};
+use crate::motion::{IDLE_THROTTLE, throttle};
 use crate::observation::{Air, Gnss, Imu, Observation, Vibration, VibrationScale};
 use crate::pairs::{Kind, Pairs, SENSORS_MAX};
 use crate::rate_tracking::{self, FullThrust, RateSetpoint};
-use crate::residual::Residuals;
+use crate::residual::{Comparison, Residuals};
 use crate::stuck::Repeats;
 use crate::time::{BootMs, FRESH, Millis, Stamp};
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
@@ -151,7 +152,7 @@ impl Crosschecks {
     fn take_vibration(&mut self, at: BootMs, vehicle: &Vehicle) {
         if let Some(level) = vehicle.vibration.get().and_then(Vibration::acceleration) {
             let lasting = level.min(core::mem::replace(&mut self.vibration, level));
-            self.residuals.take(self.residuals.vibration(), at, lasting * vibration_scale(vehicle), 0.0);
+            self.residuals.take(vibration_of(vehicle), at, lasting, 0.0);
         }
     }
 
@@ -172,8 +173,8 @@ impl Crosschecks {
         self.stepped_at = Stamp::at(now);
         self.imu_gnss.step(now, step_s, vehicle);
         // What stands does not move, whatever its estimator says.
-        let Residuals { gates, .. } = self.residuals;
-        if !gates.are(gates::HOVERS) || gates.are(gates::CONTROLLED) || !vehicle.inertial.is_level(now) {
+        let idles = throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
+        if !(idles && self.residuals.gates.are(gates::HOVERS) && vehicle.inertial.is_level(now)) {
             self.repeats.moved.step(now, step_s, vehicle);
         }
     }
@@ -193,18 +194,19 @@ impl Crosschecks {
         self.repeats.stuck(now, kind, sensor, measures)
     }
 
-    pub(crate) fn vibration_rise(&self, now: BootMs) -> Option<Reading> {
-        self.residuals.multiple(now, self.residuals.vibration())
+    pub(crate) fn vibration_rise(&self, now: BootMs, vehicle: &Vehicle) -> Option<Reading> {
+        self.residuals.multiple(now, vibration_of(vehicle))
     }
 
     /// The vibration that is so many times its baseline, m/s2.
     pub(crate) fn vibration_limit(&self, vehicle: &Vehicle, times: f32) -> Option<f32> {
-        self.residuals.limit(self.residuals.vibration(), times).map(|limit| limit / vibration_scale(vehicle))
+        self.residuals.limit(vibration_of(vehicle), times)
     }
 }
 
-/// `PX4`'s metric rises by 1 m/s2 where `ArduPilot`'s does by 2.5.
-fn vibration_scale(vehicle: &Vehicle) -> f32 {
-    let is_px4 = vehicle.vibration.get().is_some_and(|one| one.scale == VibrationScale::Px4Metrics);
-    if is_px4 { 2.5 } else { 1.0 }
+fn vibration_of(vehicle: &Vehicle) -> Comparison {
+    match vehicle.vibration.get().map(|vibration| vibration.scale) {
+        Some(VibrationScale::Px4Metrics) => Comparison::VibrationPx4,
+        _ => Comparison::Vibration,
+    }
 }

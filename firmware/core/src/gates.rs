@@ -1,7 +1,7 @@
 //! Conditions of the flight, as bits: computed once a step.
 
 use crate::flight::Flight;
-use crate::motion::{CLEAR_M, MOVES_MPS, climb_mps, ground_speed_mps};
+use crate::motion::{CLEAR_M, climb_mps};
 use crate::observation::{Gnss, LandedState, VehicleKind};
 use crate::thrust::Power;
 use crate::time::{BootMs, FRESH, Millis, PAUSE, SILENT, Stamp};
@@ -26,7 +26,6 @@ pub(crate) const HOVERS: u16 = 1 << 7;
 pub(crate) const CONTROLLED: u16 = 1 << 8;
 /// The first receiver has been exact for 15 s: `AHRS_RP_P` 0.2 makes DCM level within three time constants of 5 s.
 pub(crate) const EXACT: u16 = 1 << 9;
-pub(crate) const MOVES: u16 = 1 << 10;
 
 pub(crate) const TURNED: Millis = Millis::from_secs(1);
 const EXACT_FOR: Millis = Millis::from_secs(15);
@@ -74,7 +73,6 @@ impl Gates {
             (ONE_FRAME, rotors || kind == VehicleKind::Plane),
             (HOVERS, hovers),
             (CONTROLLED, if hovers { has_thrust } else { kind != VehicleKind::Vtol }),
-            (MOVES, ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > MOVES_MPS)),
             (EXACT, exact && self.inexact_at.age(now).is_none_or(|age| age > EXACT_FOR)),
         ] {
             self.open |= if is_open { gate } else { 0 };

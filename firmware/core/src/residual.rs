@@ -17,7 +17,7 @@
 //! | [`Comparison::Ahrs2Tilt`] | DCM | the estimator's vertical | deg |
 //! | [`Comparison::Ahrs2Height`], [`Comparison::Ahrs2Position`] | DCM | the estimator's place | m |
 //! | [`Comparison::SATELLITES`], [`Comparison::HDOP`] | their baseline | of each receiver | logarithm |
-//! | [`Comparison::Vibration`], [`Comparison::MovingVibration`] | their baseline | `VIBRATION` | m/s2 |
+//! | [`Comparison::Vibration`], [`Comparison::VibrationPx4`] | their baseline | `VIBRATION` | m/s2 |
 //! | [`Comparison::RATES`] | setpoint | body rate, roll and pitch | rad/s |
 //! | [`PAIRS`] | one sensor | another one of its kind | [`crate::pairs::Kind`] |
 
@@ -133,7 +133,7 @@ comparisons! {
     Hdop0 CONSTELLATION;
     Hdop1 CONSTELLATION;
     Vibration VIBRATION;
-    MovingVibration VIBRATION;
+    VibrationPx4 Row { hold: 1.0, ..VIBRATION };
     RollRate RATE;
     PitchRate RATE;
 }
@@ -246,11 +246,6 @@ impl Residuals {
     /// Whether a sample counts now, and the last one is old enough.
     pub(crate) fn is_due(&self, of: Comparison, at: BootMs, every: Millis) -> bool {
         of.row().is_open(self.gates) && self.each[of as usize].at.age(at).is_none_or(|age| age >= every)
-    }
-
-    /// A vehicle that moves is shaken by more than its rotors.
-    pub(crate) const fn vibration(&self) -> Comparison {
-        if self.gates.are(gates::MOVES) { Comparison::MovingVibration } else { Comparison::Vibration }
     }
 
     /// Takes a sample if its gates are open; returns the learnt part, s.

@@ -162,7 +162,7 @@ const ELSEWHERE: &str = "\
     baro_mismatch compass_unused vibration_rise motor_output motor_off esc_silent esc_errors heartbeat \
     autopilot_reboot batt_resistance gps_speed free_fall impact tumbling disarmed_in_air sinking overturned";
 
-const WITH: [(&str, &str); 8] = [
+const WITH: [(&str, &str); 7] = [
     ("cell_dev_lasting", "cell_deviation"),
     ("cell_deviation", "cell_dev_lasting"),
     ("ekf_failsafe", "ekf_variance"),
@@ -170,7 +170,6 @@ const WITH: [(&str, &str); 8] = [
     ("esc_temperature", "esc_silent"),
     ("gps_hdop", "gps_hdop_rise"),
     ("vibration", "vibration_rise"),
-    ("vibration_px4", "vibration_rise"),
 ];
 
 const DUE: [(&str, f32); 8] = [

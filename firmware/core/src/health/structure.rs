@@ -27,7 +27,7 @@ pub(super) const CHECKS: &[Check] = &[
     row!("vibration_rise" VIBRATION, above(VibeRiseWarn _ 0.5),
         role: Role::of(Group::Shaking, DRIVE | Group::EscTelemetry.bit() | Group::Vibration.bit()),
         unit: Unit::of("times"), debounce_ms: [200, 1_000], told_after_s: 10, when: CheckPhase::InFlight, stale_s: None,
-        read: |inputs, _| inputs.derived.crosschecks.vibration_rise(inputs.now)),
+        read: |inputs, _| inputs.derived.crosschecks.vibration_rise(inputs.now, inputs.vehicle)),
     row!("clipping" VIBRATION, above(ClipWarn ClipCrit 0.0),
         role: Role::of(Group::Shaking, Group::Vibration.bit()), unit: Unit::of(""), debounce_ms: [0, 0],
         when: CheckPhase::InFlight, read: |inputs, _| inputs.derived.clips(inputs.vehicle)),
