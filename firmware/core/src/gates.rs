@@ -22,7 +22,7 @@ pub(crate) const ROTORS: u16 = 1 << 5;
 pub(crate) const ONE_FRAME: u16 = 1 << 6;
 /// The vehicle flies on rotors; so may a VTOL.
 pub(crate) const HOVERS: u16 = 1 << 7;
-/// Wings control it, or rotors with thrust. In its transition a VTOL has both.
+/// Wings control it, or rotors with thrust, as far as that is known. In its transition a VTOL has both.
 pub(crate) const CONTROLLED: u16 = 1 << 8;
 /// The first receiver has been exact for 15 s: `AHRS_RP_P` 0.2 makes DCM level within three time constants of 5 s.
 pub(crate) const EXACT: u16 = 1 << 9;
@@ -61,7 +61,7 @@ impl Gates {
         let kind = vehicle.kind();
         let hovers = vehicle.hovers(now) == Some(true);
         let rotors = kind == VehicleKind::Rotorcraft;
-        let has_thrust = flight.power(now, vehicle) != Some(Power::Idle);
+        let has_thrust = !flight.thrust.has_flown || flight.power(now, vehicle) != Some(Power::Idle);
         self.open = 0;
         for (gate, is_open) in [
             (AIRBORNE, flight.airborne()),

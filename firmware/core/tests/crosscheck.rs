@@ -275,6 +275,7 @@ const FOUND_OF: &[(Begins, Found)] = &[
         helicopter,
         ("vibration_rise", &[0], Warning, 6_000, |_, it, _| it.quad.vibration.levels[0] = Some(18.0)),
     ),
+    (|it| it.quad.throttle = 0.0, ("roll_rate", &[0], Critical, 2_500, |_, it, _| it.wanted[0] = -2.5)),
     (has_second, ("ahrs2_tilt", &[0], Warning, 2_500, |_, it, _| it.second = Some([0.7, 0.0, 0.0]))),
     (has_second, ("ahrs2_height", &[0], Warning, 2_500, |_, it, _| it.second = Some([0.0, -11.0, 0.0]))),
     (has_second, ("ahrs2_height", &[0], Critical, 2_500, |_, it, _| it.second = Some([0.0, -20.0, 0.0]))),
@@ -343,7 +344,9 @@ type Quiet = (&'static str, fn(u64, &mut Fitted));
 
 const QUIET: &[Quiet] = &[
     ("one motor of four idle, and level: it stands", |_, it| it.pulses[1] = 1_000.0),
-    ("rates that idle rotors cannot follow", |_, it| (it.wanted[0], it.quad.throttle) = (-2.5, 0.08)),
+    ("rates that idle rotors cannot follow", |ms, it| {
+        (it.wanted[0], it.quad.throttle) = if ms < FAULT_MS { (0.0, 0.5) } else { (-2.5, 0.08) };
+    }),
     ("offsets from the beginning", |_, it| {
         (it.force[1][0], it.rate[1][0]) = (it.force[1][0] + 3.0, it.rate[1][0] + 0.4);
         (it.field[1], it.pressure[1]) = ([0.5, 0.0, -0.1], it.pressure[1] + 5.0);
