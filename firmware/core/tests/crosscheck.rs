@@ -331,6 +331,16 @@ fn a_rise_of_vibration_explains_other_alarms_at_once() {
 }
 
 #[test]
+fn a_rise_of_vibration_in_hover_lasts_in_motion_and_damage_at_the_first_motion_is_told() {
+    for moves_ms in [FAULT_MS, FAULT_MS + 8_000] {
+        let findings = fly_after(|ms, it| {
+            (it.quad.vibration.levels, it.speed) = ([Some(18.0); 3], if ms < moves_ms { 1.0 } else { 10.0 });
+        });
+        assert!(matches!(only(&findings), ("vibration_rise", 0, 1..=1_000)), "{moves_ms}: {findings:?}");
+    }
+}
+
+#[test]
 fn one_wrong_message_before_the_baseline_is_known_hides_no_mismatch() {
     for wrong_ms in (7_000..9_000).step_by(400) {
         let wrong = |ms| [if ms == wrong_ms { 60.0 } else { 0.0 }, 3.0][usize::from(ms >= FAULT_MS)];
