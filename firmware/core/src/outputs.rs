@@ -294,9 +294,11 @@ impl MotorOutputs {
         self.outputs.get(usize::from(motor))
     }
 
-    /// A motor that carried before, now with next to no command, stands without a fault of its own.
+    /// A motor that carried before, now with next to no command, stands without a fault of its own. Of four, only opposite to one at
+    /// its end.
     pub(crate) fn is_off(&self, motor: u8) -> bool {
-        self.output(motor).is_some_and(|output| output.off)
+        let may_be = self.count != 4 || self.outputs.iter().any(|output| output.full);
+        may_be && self.output(motor).is_some_and(|output| output.off)
     }
 
     pub(crate) fn is_full(&self, motor: u8) -> bool {
@@ -359,7 +361,7 @@ impl MotorOutputs {
         self.outputs.first().is_some_and(|output| output.share.is_known())
     }
 
-    fn judged(&self, vehicle: &Vehicle) -> usize {
+    pub(crate) fn judged(&self, vehicle: &Vehicle) -> usize {
         motors(vehicle).max(self.count.into()) * usize::from(motors(vehicle) > 0)
     }
 

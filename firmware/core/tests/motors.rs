@@ -123,6 +123,7 @@ it hovers with about 1000 of DShot | - | GIVEN out=1525x4; * dshot
 the same of CAN | - | GIVEN out=1525x4; * can
 outputs that are heard in the air first | motor_output.2 | * hexa fill=0 varies=30; 0-4 h=0; 10 out=1500,1480,1950,1510,1530,1600
 they are well | - | * hexa fill=0 varies=30; 0-4 h=0; 10 out=1500,1480,1520,1510,1530,1600
+a cut output of four | motor_imbalance.1 | * px4 yaw=0.3 rpm=5000x4; 0-4 h=0 out=1000x4; 4 h=200 out=1500x4; 20 rpm=5600,0,5400,5300 out=1525,900,1525,1525
 dead before it was heard | motor_off.2 | AIRBORNE rpm=5000x6 varies=30 out=1500,1480,900,1510,1530,1600
 weak before | motor_output.2 | AIRBORNE rpm=5000x6 varies=30 out=1500,1480,1950,1510,1530,1600
 well | - | AIRBORNE rpm=5000x6 varies=30 out=1500,1480,1520,1510,1530,1600

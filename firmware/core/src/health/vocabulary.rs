@@ -188,7 +188,7 @@ vocabulary! {
     "motor_output" Vehicle "motor output", "motor", says "motor # weak|output +~", "LAND NOW", needs "motor outputs of 4, 6 or 8 motors, on the ground and in flight";
     "The motor was driven far harder than the others: it or its propeller gives less thrust.";
     "Do not fly until its propeller, motor and ESC are checked.";
-    "motor_off" Vehicle "motor in use", "motor", says "motor # off: no output", "LAND NOW", needs "motor outputs of 4, 6 or 8 motors, on the ground and in flight";
+    "motor_off" Vehicle "motor in use", "motor", says "motor # off: no output", "LAND NOW", needs "motor outputs of 6 or 8 motors, on the ground and in flight";
     "The autopilot, or a command, shut the motor down while the others carried.";
     "Do not fly until it is known what shut it down.";
     "thrust_lost" Vehicle "climb with full throttle", "", says "full throttle, no climb", "", needs "throttle and climb";
