@@ -54,7 +54,8 @@ events! {
         commander_arm_denied_throttle_center commander_arm_denied_throttle_high mavlink_log_not_enough_bw;
     warning Compass:
         sensor_failover_mag check_mag_missing check_mag_no_data check_mag_fault check_mag_consistency
-        check_mag_sys_has_mag_missing check_estimator_mag_fault check_estimator_mag_interference
+        check_mag_sys_has_mag_missing check_estimator_mag_fault check_estimator_mag_interference;
+    critical Compass:
         commander_stopping_mag_use;
     warning Barometer:
         sensor_failover_baro check_baro_missing check_baro_no_data;
@@ -72,11 +73,11 @@ events! {
         check_estimator_gps_hor_pos_drift_too_high check_estimator_gps_hor_pos_err_too_high
         check_estimator_gps_hor_speed_drift_too_high check_estimator_gps_vert_pos_drift_too_high
         check_estimator_gps_vert_pos_err_too_high check_estimator_gps_vert_speed_drift_too_high
-        check_estimator_gps_spoofing_indicated commander_stopping_gnss_heading_use;
+        check_estimator_gps_spoofing_indicated;
     critical Gnss:
         check_estimator_gnss_warning_jamming check_estimator_gnss_warning_spoofing
         check_estimator_gps_jamming_critical check_estimator_gps_jammed check_estimator_gps_spoofed
-        check_estimator_gps_multiple_spoofing_indicated;
+        check_estimator_gps_multiple_spoofing_indicated commander_stopping_gnss_heading_use;
     over Gnss:
         check_estimator_gnss_fusion_started;
     warning Estimator:
