@@ -130,7 +130,7 @@ fn an_autopilot_is_set_for_the_box_and_the_bench_check_says_that_it_is_ready() {
     let (mut page, mut stream) = (live.page().unwrap(), TcpStream::connect(live.host()).unwrap());
     let body = "Content-Length: 22\r\n\r\n{\"cmd\":\"check\",\"to\":1}";
     write!(stream, "POST /command HTTP/1.1\r\nHost: {}\r\n{body}", live.host()).unwrap();
-    let shown = (0..).map(|_| json(&page.message())).find(|message| message["found"].is_object()).unwrap();
+    let shown = (0..9_999).map(|_| json(&page.message())).find(|told| told["found"].is_object()).unwrap();
     assert_eq!(shown["words"], "ready to fly, but not known: clock", "of a recording: {shown}");
 
     on(&address, &["setup", "--restore", &undo]).expect_code(&[0]);

@@ -87,7 +87,8 @@ const linked = (now, count, token) => {
   stir();
 };
 const wire = connect(take, linked, () => speaker.on);
-const check = bench(() => wire.send({ cmd: "check", to: state?.vehicle ?? null }), () => head?.source.name ?? "SRC");
+const ask = () => wire.send({ cmd: "check", to: state?.vehicle ?? null });
+const check = bench(ask, () => head?.source.name ?? "SRC");
 const time = player((command) => wire.send(command), stir);
 const go = (at) => {
   if (!time.recording) lookAt(at);
