@@ -172,7 +172,7 @@ impl Crosschecks {
         let step_s = step.map_or(0.0, |step| step.min(FRESH).as_secs_f32());
         self.stepped_at = Stamp::at(now);
         self.imu_gnss.step(now, step_s, vehicle);
-        // What stands does not move, whatever its estimator says.
+        // A standing vehicle does not move, whatever its estimator says.
         let idles = throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
         if !(idles && self.residuals.gates.are(gates::HOVERS) && vehicle.inertial.is_level(now)) {
             self.repeats.moved.step(now, step_s, vehicle);

@@ -1,6 +1,6 @@
 //! Windows closes the console of a program that Explorer started (dropped files) when it ends.
 
-/// Waits for Enter if no other program (a shell) has this console. So has a scheduled command, which must not wait.
+/// Waits for Enter if no other program (a shell) shares this console. Not for commands: a scheduled one must not wait.
 #[cfg(windows)]
 pub fn hold() {
     use std::io::{self, IsTerminal as _};

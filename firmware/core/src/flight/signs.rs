@@ -247,7 +247,7 @@ impl Flight {
 
     fn take_shock(&mut self, at: BootMs, load_g: f32, vehicle: &Vehicle, params: &Params) {
         if load_g.is_finite() && load_g > params.get(Param::MisImpact) {
-            // What broke off a speed or a fall goes on while it bounces, or thrashes about.
+            // An impact goes on while the vehicle bounces, or thrashes about.
             let before = self.shock.and_then(|shock| {
                 let goes_on = at.since(shock.at) <= BREAKS_OFF;
                 let ends = shock.stopped || shock.dropped || shock.has_hit;
