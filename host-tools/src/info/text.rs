@@ -214,7 +214,6 @@ fn more(text: &mut String, count: u64, shown: usize) {
 
 fn gaps_text(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
-    let is_part = log.ending.files.iter().any(|file| is_part(Path::new(file)));
     let own = log.format.is_none();
     if summary.gaps + summary.losses + summary.blocks.damaged == 0 {
         text.push_str("  gaps     none\n");
@@ -234,10 +233,21 @@ fn gaps_text(text: &mut String, log: &Overview) {
             count(summary.blocks.damaged, "damaged sector")
         );
     }
-    if !own {
-        foreign_gaps(text, log);
+    let gaps = if own { own_gaps } else { foreign_gaps };
+    gaps(text, log);
+    more(
+        text,
+        (summary.gaps + summary.losses).max(contents.gaps.len() as u64),
+        contents.gaps.len().min(SHOWN_MAX),
+    );
+    for loss in contents.losses.values() {
+        let _ = writeln!(text, "  lost     {}", loss::told(loss));
     }
-    for gap in contents.gaps.iter().take(if own { SHOWN_MAX } else { 0 }) {
+}
+
+fn own_gaps(text: &mut String, log: &Overview) {
+    let is_part = log.ending.files.iter().any(|file| is_part(Path::new(file)));
+    for gap in log.contents.gaps.iter().take(SHOWN_MAX) {
         let time = |at: Option<Instant>, none: &str| at.map_or_else(|| none.to_owned(), moment);
         let frames = gap
             .frames
@@ -252,14 +262,6 @@ fn gaps_text(text: &mut String, log: &Overview) {
             if is_part && gap.cause == Cause::Missing { "not brought yet" } else { why(log, gap) },
             gap.sectors_skipped
         );
-    }
-    more(
-        text,
-        (summary.gaps + summary.losses).max(contents.gaps.len() as u64),
-        contents.gaps.len().min(SHOWN_MAX),
-    );
-    for loss in contents.losses.values() {
-        let _ = writeln!(text, "  lost     {}", loss::told(loss));
     }
 }
 
