@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write as _;
 use std::net::TcpListener;
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use hums_tests::flights::{Manifest, own, root};
 use hums_tests::frames::of_tlog;
@@ -132,15 +132,21 @@ fn victoriametrics_is_restarted_in_flight_and_has_every_sample_in_the_end() {
 #[test]
 fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refused() {
     let database = Database::start(Kind::Influx);
+    let data = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
+    let frames = of_tlog(&data, &Manifest::own().seeds, false);
+    let count_of = |id| frames.iter().filter(|frame| frame.verified && frame.id == id).count() as u64;
     let flight = |database: &Database| {
         let url = format!("http://127.0.0.1:{}", database.port);
         let recording = own("px4_hil_quad_low.tlog");
         let live = Live::start(&[recording.to_str().unwrap(), "--influx", &url]);
-        std::thread::sleep(Duration::from_secs(3));
+        let given_up = Instant::now() + Duration::from_mins(1);
+        while database.points("VFR_HUD") < count_of(74) && Instant::now() < given_up {
+            std::thread::sleep(Duration::from_millis(200));
+        }
+        // The last points are on their way.
+        std::thread::sleep(Duration::from_secs(1));
         live.terminate(Duration::from_mins(1))
     };
-    let data = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
-    let frames = of_tlog(&data, &Manifest::own().seeds, false);
     let at_us = frames[0].time_us.expect("a tlog's frames have times");
     database.write(&format!("ATTITUDE,vehicle=x,session=x roll=\"text\" {at_us}000"));
     let (code, words) = flight(&database);
@@ -151,8 +157,7 @@ fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refuse
         line.split_whitespace().next().unwrap().parse().unwrap()
     };
     let (written, refused) = (count("points written"), count("refused by the database"));
-    let attitudes = frames.iter().filter(|frame| frame.verified && frame.id == 30).count() as u64;
-    assert_eq!(refused, attitudes, "{words}");
+    assert_eq!(refused, count_of(30), "{words}");
     let points: u64 = database.measurements().iter().map(|measurement| database.points(measurement)).sum();
     assert_eq!(points, written + 1, "and the one that was there before");
 }
