@@ -5,10 +5,10 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use sha2::{Digest as _, Sha256};
 
-use crate::files::{Folder, digest_of};
+use crate::files::Folder;
 use crate::hex::hex;
 use crate::logs::Log;
 use crate::logs::board::{HEADING_GROUPS, board_of};
@@ -16,7 +16,6 @@ use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
 use crate::logs::groups::Groups;
 use crate::logs::naming::{ends_with_identity, segment_name, session_name};
 use crate::logs::sessions::Sessions;
-use crate::source::input::Input;
 use crate::source::recording::LogPlace;
 
 /// File systems allow 255 bytes, and at most 55 follow.
@@ -37,8 +36,7 @@ impl Traits {
     /// Reads all sectors, or all bytes of another recording.
     pub fn of(place: &LogPlace) -> Result<Self> {
         let Some(log) = place.own() else {
-            let fingerprint = place.path().map(fingerprint).transpose()?.unwrap_or_default();
-            return Ok(Self { fingerprint, ..Self::default() });
+            return Ok(Self { fingerprint: place.fingerprint()?, ..Self::default() });
         };
         let mut groups = Groups::new(log);
         let mut all = Fingerprinter::default();
@@ -215,16 +213,6 @@ fn cut(mut name: String) -> String {
     let end = (0..=NAME_BYTES_MAX.min(name.len())).rev().find(|at| name.is_char_boundary(*at));
     name.truncate(end.unwrap_or(0));
     name
-}
-
-/// Hash of all bytes of a recording, unpacked: a compressed copy is the same recording.
-///
-/// # Errors
-/// The file cannot be read.
-pub fn fingerprint(path: &Path) -> Result<[u8; 16]> {
-    let digest =
-        digest_of(Input::open(path)?).with_context(|| format!("{}: cannot be read", path.display()))?;
-    Ok(digest.first_chunk().copied().unwrap_or_default())
 }
 
 fn base(log: &Log) -> String {

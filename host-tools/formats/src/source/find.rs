@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail};
 
-use super::format::{KNOWN, begins_recording, detect, format_of, hint, is_recording, start_of};
+use super::format::{Detected, KNOWN, begins_recording, detect, format_of, hint, is_recording, start_of};
 use super::recording::{LogPlace, of_one_vehicle};
 use crate::archive::GZIP;
 use crate::files::{FileId, why_unread};
@@ -16,7 +16,6 @@ use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::naming::{make_unique, name_after};
 use crate::logs::sessions::{Sessions, copy_words, first_session};
 use crate::logs::{self, Content, segment_name};
-use crate::naming::fingerprint;
 use crate::outcome::{Usage, usage};
 use crate::plural::count;
 use crate::printable;
@@ -124,7 +123,7 @@ impl FoundRecordings {
             let own = logs::find::find_in(input, salvage)?;
             let mut walk = Walk::of(input, &own)?;
             self.add_own(input, own);
-            self.places.extend(walk.paths.iter().map(|path| LogPlace::file(path)));
+            self.places.append(&mut walk.places);
             self.drop_made();
             self.is_cut |= walk.left_out > 0;
             self.remarks.extend(walk.left_out_words(input));
@@ -168,9 +167,8 @@ impl FoundRecordings {
         for alike in by_length.into_values().filter(|alike| alike.len() > 1) {
             let mut known: BTreeMap<[u8; 16], usize> = BTreeMap::new();
             for index in alike {
-                let path = self.places.get(index).and_then(LogPlace::path);
                 // An unreadable file is reported when it is read.
-                let Some(bytes) = path.and_then(|path| fingerprint(path).ok()) else { continue };
+                let Some(Ok(bytes)) = self.places.get(index).map(LogPlace::fingerprint) else { continue };
                 let first = *known.entry(bytes).or_insert(index);
                 if first != index {
                     copies.insert(index, first);
@@ -291,7 +289,7 @@ pub fn find_each(inputs: &[PathBuf], salvage: bool) -> Result<FoundRecordings> {
 /// Other contents of a folder, as sentences. Also whether a file is named like a recording and holds none.
 pub fn besides(folder: &Path, own: &logs::FoundLogs) -> Result<(Vec<String>, bool)> {
     let walk = Walk::of(folder, own)?;
-    let recordings = walk.paths.len();
+    let recordings = walk.places.len();
     let not_judged = (recordings > 0).then(|| {
         format!(
             "{}: {} of other kinds passed over: `hums check` judges them",
@@ -375,7 +373,7 @@ fn not_known(path: &Path, error: anyhow::Error) -> anyhow::Error {
 /// A folder's recordings other than HUMS logs. Links lead to each folder once; pipes, sockets and devices are not opened.
 #[derive(Default)]
 struct Walk {
-    paths: Vec<PathBuf>,
+    places: Vec<LogPlace>,
     walked: logs::WalkedFolders,
     /// No room.
     left_out: u64,
@@ -427,7 +425,7 @@ impl Walk {
             return Ok(());
         }
         let context = || format!("{}: cannot be read", dir.display());
-        let mut inside: Vec<(PathBuf, bool)> = Vec::new();
+        let mut inside: Vec<(PathBuf, Option<Detected>)> = Vec::new();
         for entry in fs::read_dir(dir).with_context(context)? {
             let entry = entry.with_context(context)?;
             let (path, kind) = (entry.path(), logs::kind_of(&entry).with_context(context)?);
@@ -436,7 +434,8 @@ impl Walk {
                 continue;
             }
             let start = if kind.is_file() { start_of(&path) } else { Vec::new() };
-            let wanted = if kind.is_dir() { depth < DEPTH_MAX } else { detect(&start).is_some() };
+            let format = detect(&start);
+            let wanted = if kind.is_dir() { depth < DEPTH_MAX } else { format.is_some() };
             if kind.is_file() && !wanted && logs::is_named_as_log(&path) {
                 continue;
             }
@@ -461,19 +460,18 @@ impl Walk {
                 }
                 continue;
             }
-            if self.paths.len() + inside.len() < WALKED_MAX {
-                inside.push((path, kind.is_dir()));
+            if self.places.len() + inside.len() < WALKED_MAX {
+                inside.push((path, format));
             } else {
                 self.left_out += 1;
             }
         }
-        inside.sort();
-        for (path, is_folder) in inside {
-            if is_folder {
+        inside.sort_by(|(path, _), (other, _)| path.cmp(other));
+        for (path, format) in inside {
+            match format {
+                Some(format) => self.places.push(LogPlace::detected(&path, format)),
                 // Reported with HUMS logs.
-                let _ = self.folder(&path, depth + 1);
-            } else {
-                self.paths.push(path);
+                None => drop(self.folder(&path, depth + 1)),
             }
         }
         Ok(())

@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::mem;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use anyhow::{Context as _, Result, bail};
 use hums_core::clock::Instant;
@@ -15,7 +16,9 @@ use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
 use super::parts::{ItemCollector, PART_BYTES, PART_ITEMS, PartReceiver};
 use super::{dataflash, ulog};
+use crate::files::digest_of;
 use crate::logs::Log;
+use crate::logs::fingerprint::Fingerprint;
 use crate::outcome::usage;
 use crate::progress;
 
@@ -40,8 +43,22 @@ pub struct LogPlace {
 enum From {
     /// Read once.
     Standard,
-    File(PathBuf),
+    File(PathBuf, Facts),
     Log(Box<Log>),
+}
+
+/// Facts of a file that take a reading, once they are known.
+#[derive(Clone, Debug, Default)]
+struct Facts {
+    format: OnceLock<Detected>,
+    fingerprint: OnceLock<Fingerprint>,
+}
+
+fn once<T: Copy>(known: &OnceLock<T>, find: impl FnOnce() -> Result<T>) -> Result<T> {
+    match known.get() {
+        Some(known) => Ok(*known),
+        None => find().map(|found| *known.get_or_init(|| found)),
+    }
 }
 
 impl LogPlace {
@@ -67,8 +84,14 @@ impl LogPlace {
             title: path.display().to_string(),
             name: name.into_owned(),
             system: None,
-            source: From::File(path.to_owned()),
+            source: From::File(path.to_owned(), Facts::default()),
         }
+    }
+
+    /// A file of this format.
+    pub(super) fn detected(path: &Path, format: Detected) -> Self {
+        let facts = Facts { format: format.into(), ..Facts::default() };
+        Self { source: From::File(path.to_owned(), facts), ..Self::file(path) }
     }
 
     /// A session of a HUMS log.
@@ -87,7 +110,7 @@ impl LogPlace {
     /// A single file.
     pub fn path(&self) -> Option<&Path> {
         match &self.source {
-            From::File(path) => Some(path),
+            From::File(path, _) => Some(path),
             From::Standard | From::Log(_) => None,
         }
     }
@@ -107,16 +130,33 @@ impl LogPlace {
     pub fn bytes(&self) -> u64 {
         match &self.source {
             From::Standard => 0,
-            From::File(path) => fs::metadata(path).map_or(0, |about| about.len()),
+            From::File(path, _) => fs::metadata(path).map_or(0, |about| about.len()),
             From::Log(log) => log.bytes(),
         }
+    }
+
+    /// Hash of all bytes of a file, unpacked: a compressed copy is the same recording. Zeros of anything else.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn fingerprint(&self) -> Result<Fingerprint> {
+        let From::File(path, facts) = &self.source else { return Ok(Fingerprint::default()) };
+        once(&facts.fingerprint, || {
+            let digest = digest_of(Input::open(path)?);
+            let digest = digest.with_context(|| format!("{}: cannot be read", path.display()))?;
+            Ok(digest.first_chunk().copied().unwrap_or_default())
+        })
     }
 
     /// Opens it.
     pub fn open(&self) -> Result<Recording> {
         let recording = match &self.source {
             From::Standard => Recording::new(Input::new(io::stdin())?, &self.title)?,
-            From::File(path) => Recording::new(Input::open(path)?, &self.title)?,
+            From::File(path, facts) => {
+                let mut input = Input::open(path)?;
+                let format = once(&facts.format, || detected(&mut input, &self.title))?;
+                Recording::of(format, input, &self.title)?
+            }
             From::Log(log) => {
                 let reader = OwnReader::new(log.as_ref().clone());
                 let progress = reader.progress();
@@ -206,6 +246,24 @@ pub(super) fn of_one_vehicle(title: &str) -> anyhow::Error {
     ))
 }
 
+/// The format by content; `name` is for messages.
+fn detected(input: &mut Input, name: &str) -> Result<Detected> {
+    let start = input.peek(LOOK_BYTES).with_context(|| format!("{name}: cannot be read"))?;
+    if let Some(what) = hint(&start) {
+        bail!("{name}: {what}");
+    }
+    if let Some(format) = detect(&start) {
+        return Ok(format);
+    }
+    if let Some(words) = input.progress().damage().filter(|_| start.is_empty()) {
+        bail!("{name}: {words}");
+    }
+    if start.is_empty() {
+        bail!("{name}: is empty; copy it again");
+    }
+    bail!("{name}: is neither a log of HUMS, a card or its image, nor {KNOWN}");
+}
+
 /// A recording, open at its beginning.
 pub struct Recording {
     /// Its format.
@@ -220,20 +278,10 @@ pub struct Recording {
 impl Recording {
     /// A recording by content; `name` is for messages.
     pub fn new(mut input: Input, name: &str) -> Result<Self> {
-        let context = || format!("{name}: cannot be read");
-        let start = input.peek(LOOK_BYTES).with_context(context)?;
-        if let Some(what) = hint(&start) {
-            bail!("{name}: {what}");
-        }
-        let Some(format) = detect(&start) else {
-            if let Some(words) = input.progress().damage().filter(|_| start.is_empty()) {
-                bail!("{name}: {words}");
-            }
-            if start.is_empty() {
-                bail!("{name}: is empty; copy it again");
-            }
-            bail!("{name}: is neither a log of HUMS, a card or its image, nor {KNOWN}");
-        };
+        Self::of(detected(&mut input, name)?, input, name)
+    }
+
+    fn of(format: Detected, input: Input, name: &str) -> Result<Self> {
         let progress = input.progress();
         let reader: Box<dyn Reader> = match format {
             Detected::Tlog => Box::new(TlogReader::new(input)),
