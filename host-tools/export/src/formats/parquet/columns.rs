@@ -462,15 +462,11 @@ impl TableRows {
         }
     }
 
-    pub(crate) fn take(&mut self) -> Self {
-        let (rows, columns) = (std::mem::take(&mut self.rows), &mut self.columns);
-        let take = |column: &mut Column| Column {
-            name: column.name.clone(),
-            values: std::mem::replace(&mut column.values, column.kind.values()),
-            levels: std::mem::take(&mut column.levels),
-            ..*column
-        };
-        Self { columns: columns.iter_mut().map(take).collect(), rows, has_frames: self.has_frames }
+    pub(super) fn clear(&mut self) {
+        self.rows = 0;
+        for column in &mut self.columns {
+            (column.values, column.levels) = (column.kind.values(), Vec::new());
+        }
     }
 
     pub(super) fn columns(&self) -> &[Column] {
@@ -543,7 +539,7 @@ mod tests {
             columns.row(Instant::from_millis(5), None, row);
         }
         assert!(columns.held_bytes() > 0);
-        let taken = columns.take();
+        let taken = &columns;
         let names: Vec<&str> = taken.columns.iter().map(|column| column.name.as_str()).collect();
         assert_eq!(names, ["boot_s", "utc", "count_m", "words"]);
         assert_eq!(taken.columns[1].levels, [0; 4], "no UTC");
@@ -552,6 +548,7 @@ mod tests {
         assert_eq!(taken.columns[3].levels, [1, 0, 1, 1]);
         let Values::Texts(texts) = &taken.columns[3].values else { panic!("texts") };
         assert_eq!(texts.some(1, 2), [ByteArray::from(""), ByteArray::from("d\u{e9}")]);
+        columns.clear();
         assert!(columns.rows() == 0 && columns.columns[0].values.count() == 0, "nothing is left");
     }
 }

@@ -18,6 +18,7 @@ pub(crate) use columns::TAKEN_FRAMES;
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry::{Occupied, Vacant};
 use std::fs::File;
 use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
@@ -130,8 +131,12 @@ impl ParquetTables {
     fn put(&mut self, batches: Batches) -> Result<()> {
         let (frames, rows) = batches.parts();
         for (table, columns) in frames {
-            let new = || TableFile::new(table, TableRows::of_frames(table));
-            self.tables.entry(table).or_insert_with(new).frames(columns)?;
+            match self.tables.entry(table) {
+                Occupied(file) => file.into_mut().frames(columns)?,
+                Vacant(place) => {
+                    place.insert(TableFile::new(table, columns));
+                }
+            }
         }
         for (name, rows) in rows {
             let Some((_, _, first)) = rows.first() else { continue };
@@ -316,7 +321,7 @@ impl Open {
 
 impl TableFile {
     fn new(table: Table, columns: TableRows) -> Self {
-        Self { table, columns, pending_bytes: 0, open: None, parts: 0 }
+        Self { table, pending_bytes: columns.held_bytes(), columns, open: None, parts: 0 }
     }
 
     fn frames(&mut self, columns: TableRows) -> Result<()> {
@@ -350,16 +355,23 @@ impl TableFile {
         if self.columns.rows() == 0 {
             return Ok(());
         }
-        let rows = self.columns.take();
-        self.pending_bytes = 0;
         let open = match &mut self.open {
             Some(open) => open,
             none => {
                 self.parts += 1;
-                none.insert(Open::new(session, &self.table.name(), self.parts, rows.columns(), properties)?)
+                none.insert(Open::new(
+                    session,
+                    &self.table.name(),
+                    self.parts,
+                    self.columns.columns(),
+                    properties,
+                )?)
             }
         };
-        open.write(&rows, properties).with_context(|| cannot_write(&open.path))
+        open.write(&self.columns, properties).with_context(|| cannot_write(&open.path))?;
+        self.columns.clear();
+        self.pending_bytes = 0;
+        Ok(())
     }
 
     fn end_file(&mut self, session: &Session) -> Result<()> {
