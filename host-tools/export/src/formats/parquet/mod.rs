@@ -54,6 +54,10 @@ const GROUP_ROWS: usize = 128 * 1024;
 const PAGE_BYTES: usize = 32 * 1024;
 /// Columns of texts of a table at most that have a dictionary: it takes 73 kB of each.
 const DICTIONARIES_MAX: usize = 32;
+/// Rows that are read as fast as their statistics: such a table has these only for the columns that select sessions, and its
+/// texts have no dictionaries, which take longer to make than to do without.
+const ROWS_FEW: usize = 1024;
+const SELECTING: [&str; 3] = ["vehicle", "session", "utc"];
 const OPEN_FILE_BYTES: usize = 18 << 10;
 const OPEN_COLUMN_BYTES: usize = 1_000;
 /// Memory of each column of a written row group.
@@ -120,8 +124,6 @@ impl ParquetTables {
             .set_data_page_size_limit(PAGE_BYTES)
             .set_dictionary_page_size_limit(PAGE_BYTES)
             .set_dictionary_enabled(false)
-            // Metadata of each page would be kept until the file's end.
-            .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_offset_index_disabled(true)
             .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned());
         let properties = Properties { writer, about, names };
@@ -271,16 +273,23 @@ impl Open {
         session: &Session,
         table: &str,
         part: u32,
-        columns: &[Column],
+        rows: &TableRows,
         properties: &Properties,
     ) -> Result<Self> {
-        let path = session.path(table, part);
+        let (path, columns) = (session.path(table, part), rows.columns());
+        let is_large = rows.rows() > ROWS_FEW;
         // Files of numbers are a sixth smaller without a dictionary; texts gain by it.
         let texts = columns.iter().filter_map(Column::text_name).take(DICTIONARIES_MAX);
-        let texts = NAMES.into_iter().chain(texts);
+        let texts = NAMES.into_iter().chain(texts.filter(|_| is_large));
         let writer = texts.fold(properties.writer.clone(), |writer, name| {
             writer.set_column_dictionary_enabled(vec![name.to_owned()].into(), true)
         });
+        let writer = SELECTING.into_iter().fold(writer, |writer, name| {
+            writer.set_column_statistics_enabled(vec![name.to_owned()].into(), EnabledStatistics::Chunk)
+        });
+        // Metadata of each page would be kept until the file's end.
+        let statistics = if is_large { EnabledStatistics::Chunk } else { EnabledStatistics::None };
+        let writer = writer.set_statistics_enabled(statistics);
         let about = columns.iter().flat_map(Column::about);
         let about = about.map(|(name, value)| KeyValue::new(name, value.to_owned()));
         let writer =
@@ -359,13 +368,7 @@ impl TableFile {
             Some(open) => open,
             none => {
                 self.parts += 1;
-                none.insert(Open::new(
-                    session,
-                    &self.table.name(),
-                    self.parts,
-                    self.columns.columns(),
-                    properties,
-                )?)
+                none.insert(Open::new(session, &self.table.name(), self.parts, &self.columns, properties)?)
             }
         };
         open.write(&self.columns, properties).with_context(|| cannot_write(&open.path))?;
