@@ -114,13 +114,15 @@ impl GroupEncoder for () {
     }
 }
 
-/// Counts of a log's entries.
-#[derive(Clone, Copy, Debug)]
+/// Facts of a log that was read.
+#[derive(Clone, Debug, Default)]
 pub struct Totals {
     /// Frames.
     pub frames: u64,
     /// Records and rows.
     pub records: u64,
+    /// As in [`Identity`](crate::identity::Identity).
+    pub vehicle: String,
 }
 
 impl Totals {

@@ -114,8 +114,9 @@ pub fn identity(place: &LogPlace, traits: &Traits, judges: bool, given: Option<&
     Ok(Preview { identity: Identity { vehicle, date, session, recording, epochs }, checked, about })
 }
 
+/// What tells the vehicle of a recording.
 #[derive(Default)]
-struct Sources {
+pub(crate) struct Sources {
     /// A packed log has no such record, so the vehicle's own messages count too.
     recorded: Option<Vehicle>,
     board: Option<[u8; 12]>,
@@ -125,7 +126,7 @@ struct Sources {
 }
 
 impl Sources {
-    fn take(&mut self, at: Instant, item: &Item<'_>) {
+    pub(crate) fn take(&mut self, at: Instant, item: &Item<'_>) {
         match item {
             Item::Record(Record::Vehicle(vehicle)) => self.recorded = Some(*vehicle),
             Item::Record(Record::Boot(boot)) if boot.uid != [0; 12] => {
@@ -148,7 +149,7 @@ impl Sources {
         }
     }
 
-    fn vehicle(&self, place: &LogPlace, given: Option<&str>) -> String {
+    pub(crate) fn vehicle(&self, place: &LogPlace, given: Option<&str>) -> String {
         let recorded = self.recorded.map(|of| (of.system, of.vehicle_type, of.autopilot));
         let uid = self.recorded.map(|vehicle| vehicle.uid).filter(|uid| *uid != 0).or(self.uid);
         match (uid, given, self.board, recorded.or(self.heard)) {

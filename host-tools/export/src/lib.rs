@@ -71,7 +71,7 @@ use followed::{EndResolver, HasEnding};
 use format::{Files, Finished, Way};
 use formats::FORMATS;
 use formats::influx::Tags;
-use identity::identity;
+use identity::{Identity, Sources, identity};
 use logs::reader;
 use logs::sessions::copy_words;
 use logs::side_by_side::side_by_side;
@@ -538,6 +538,7 @@ impl Task<'_> {
             offset_s: self.offset_s,
             fleet: Some(self.fleet.clone()),
             session: work.traits.identity(),
+            identity: Identity { session: work.traits.identity(), ..Identity::default() },
             ..Context::default()
         };
         if self.has_findings {
@@ -601,16 +602,18 @@ impl Task<'_> {
             return Ok((place.in_parts(want, new, &mut writers)?, writers, None));
         };
         let mut judge = context.judges.then(|| Judge::new(&Limits::default(), Format::Hums));
-        let said = writers.said();
+        let (said, mut sources) = (writers.said(), Sources::default());
         let summary = place.in_parts_and_order(log, want, new, &mut writers, &mut |at, item| {
             if let Some(judge) = &mut judge {
                 judge.item(at, item);
             }
+            sources.take(at, &item);
             if has_words && context.selection.has_time(at, &context.epochs) {
                 said.borrow_mut().extend(StoryEntry::of(at, &item));
             }
             Ok(())
         })?;
+        writers.vehicle = sources.vehicle(place, self.vehicle);
         Ok((summary, writers, judge.and_then(|judge| Checked::new(judge.end()))))
     }
 }

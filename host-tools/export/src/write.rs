@@ -31,6 +31,8 @@ pub struct Writers<'a> {
     rows_left_out: u64,
     /// The state of the recording, by its gaps.
     lacks: Soundness,
+    /// As in [`Identity`](crate::identity::Identity).
+    pub vehicle: String,
 }
 
 impl<'a> Writers<'a> {
@@ -64,6 +66,7 @@ impl<'a> Writers<'a> {
             on_board: FindingCount::default(),
             rows_left_out: 0,
             lacks: Soundness::Whole,
+            vehicle: context.identity.vehicle.clone(),
         })
     }
 
@@ -130,7 +133,7 @@ impl<'a> Writers<'a> {
 
     /// The log is complete: the files get their names. Returns the outputs.
     pub fn finish(self) -> Result<Finished> {
-        let totals = Totals { frames: self.frames, records: self.records };
+        let totals = Totals { frames: self.frames, records: self.records, vehicle: self.vehicle };
         let mut all = Finished::default();
         if self.rows_left_out > 0 {
             let rows = count(self.rows_left_out, "row");
@@ -139,7 +142,7 @@ impl<'a> Writers<'a> {
             ));
         }
         for writer in self.files {
-            let Finished { made, remarks } = writer.finish(self.context, totals)?;
+            let Finished { made, remarks } = writer.finish(self.context, totals.clone())?;
             all.made.extend(made);
             all.remarks.extend(remarks);
         }

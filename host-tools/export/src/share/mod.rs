@@ -256,7 +256,7 @@ impl Share {
             Ok(())
         })?;
         file.part(context, Words::default(), &story)?;
-        file.finish(context, Totals { frames: 0, records: 0 })?;
+        file.finish(context, Totals::default())?;
         self.remove("all messages of the log that are not in the copy's topics (docs/decode.md#ulog)");
         Ok(lossy)
     }

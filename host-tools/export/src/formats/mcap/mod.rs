@@ -290,18 +290,13 @@ impl Writer for Mcap {
     const ABOUT: FormatDetails = FormatDetails {
         has_observations: true,
         has_words: true,
-        needs_identity: true,
         ..FormatDetails::new("mcap", "Everything, for Foxglove and PlotJuggler", Files::One("mcap"))
     };
     type Encoder = Messages;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
-        let mut file = Container::open(context, path)?;
-        let identity = &context.identity;
-        let facts = [("vehicle", &identity.vehicle), ("session", &identity.session)];
-        file.metadata("hums", &facts.map(|(name, value)| (name.to_owned(), value.clone())))?;
         Ok(Self {
-            file,
+            file: Container::open(context, path)?,
             channels: BTreeMap::new(),
             schemas: BTreeMap::new(),
             motion: Motion::default(),
@@ -321,7 +316,9 @@ impl Writer for Mcap {
         derived.try_for_each(|message| self.message(&part.rows, message))
     }
 
-    fn finish(self, _: &Context, _: Totals) -> Result<Finished> {
+    fn finish(mut self, context: &Context, totals: Totals) -> Result<Finished> {
+        let facts = [("vehicle", &totals.vehicle), ("session", &context.identity.session)];
+        self.file.metadata("hums", &facts.map(|(name, value)| (name.to_owned(), value.clone())))?;
         let (file, messages) = self.file.finish()?;
         let made = OutputFile::of(file.finish()?, "mcap", &[(messages, "message")]);
         let left_out = (self.left_out > 0).then(|| {
