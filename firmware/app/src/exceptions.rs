@@ -31,17 +31,15 @@ pub(crate) fn number_of(task: Task) -> u16 {
 }
 
 pub(crate) fn rank(number: u16) -> usize {
-    let tasks = [Task::Reception, Task::Monitor, Task::Downlink, Task::Storage];
-    match tasks.into_iter().position(|task| number_of(task) == number) {
+    match Task::ALL.into_iter().position(|task| number_of(task) == number) {
         Some(place) => 1 + place,
-        None if number == 0 => 1 + tasks.len(),
+        None if number == 0 => 1 + Task::ALL.len(),
         None => 0,
     }
 }
 
 pub(crate) fn begun() -> u16 {
-    let tasks = [Task::Reception, Task::Monitor, Task::Downlink, Task::Storage];
-    tasks.into_iter().map(number_of).find(|number| NVIC::is_active(Number(number - 16))).unwrap_or(0)
+    Task::ALL.into_iter().map(number_of).find(|number| NVIC::is_active(Number(number - 16))).unwrap_or(0)
 }
 
 #[derive(Clone, Copy)]

@@ -33,7 +33,7 @@ use hums_blackbox::record::{Boot, LastSession};
 use hums_core::Monitor;
 use hums_core::parameters::{Param, Params};
 use hums_onboard::persist::mailbox::MailboxOut;
-use hums_onboard::queues::{Ends, Queues, UplinkIn};
+use hums_onboard::queues::{MonitorEnds, Queues, UplinkIn};
 use hums_onboard::{Handover, Mailbox, Monitoring, ResetCause, StoreWriter};
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -46,7 +46,6 @@ static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
 static MONITOR: StaticCell<Monitor> = StaticCell::new();
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
-static ENDS: StaticCell<monitor::Ends> = StaticCell::new();
 /// Of uplink and USB, which are as urgent as each other.
 static UPLINK_IN: StaticCell<UplinkIn<'static>> = StaticCell::new();
 static STORE_WRITER: StaticCell<StoreWriter<'static, board::StoreFlash>> = StaticCell::new();
@@ -74,8 +73,7 @@ fn start() {
     parts.boot.cause = cause;
     log::log!(info, "start {=u32}, {=str}, id {=[u8]:02x}", boots, parts.boot.cause.name(), parts.boot.id);
 
-    let queues = QUEUES.take().split();
-    let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out, .. } = queues;
+    let (out, ends) = QUEUES.take().split();
     let identity = Boot {
         version: env!("CARGO_PKG_VERSION"),
         git: env!("HUMS_GIT"),
@@ -108,27 +106,23 @@ fn start() {
     }
     let entropy = parts.boot.entropy.unwrap_or_else(|| counted(store_writer.mounts(), &identity));
     let handover = HANDOVER.init_with(|| Handover::new(items_in, &status::STORE_STATUS, monitor));
-    let monitoring = monitoring(monitor, identity, parts.boot.cause);
+    let monitoring = monitoring(monitor, identity, parts.boot.cause, out);
     monitoring.restore_signing(store_writer);
 
     let plug = tasks::usb::plug(parts.usb, parts.boot.id);
     let on = executors::start();
     let (autopilot_rx, autopilot_tx) = parts.autopilot;
     let (gs_rx, gs_tx) = parts.gs;
-    on.reception.spawn(tasks::reception::run(autopilot_rx, frames_in).expect(ONCE));
-    let ends = ENDS.init(monitor::Ends {
-        frames: frames_out,
-        uplink: queues.uplink_out,
-        sectors: sectors_in,
-        gs: gs_in,
-    });
-    on.monitor.spawn(monitor::run(monitoring, ends, handover, parts.boot, message, parts.led).expect(ONCE));
-    on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
-    on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
-    let uplink = &*UPLINK_IN.init(queues.uplink_in);
+    on.reception.spawn(tasks::reception::run(autopilot_rx, ends.frames_in).expect(ONCE));
+    let (frames, requests) = (ends.frames_out, ends.uplink_out);
+    let monitor = monitor::run(monitoring, frames, requests, handover, parts.boot, message, parts.led);
+    on.monitor.spawn(monitor.expect(ONCE));
+    on.downlink.spawn(tasks::downlink::run(gs_tx, ends.gs_out).expect(ONCE));
+    on.downlink.spawn(tasks::downlink::requests(autopilot_tx, ends.autopilot_out).expect(ONCE));
+    let uplink = &*UPLINK_IN.init(ends.uplink_in);
     on.downlink.spawn(tasks::uplink::run(gs_rx, uplink).expect(ONCE));
-    on.downlink.spawn(tasks::usb::run(plug, queues.usb_out, uplink).expect(ONCE));
-    let storage = storage::body(parts.card, entropy, sectors_out, queues.shelf, store_writer);
+    on.downlink.spawn(tasks::usb::run(plug, ends.usb_out, uplink).expect(ONCE));
+    let storage = storage::body(parts.card, entropy, ends.sectors_out, ends.shelf, store_writer);
     on.storage.spawn(storage::run(storage).expect(ONCE));
 }
 
@@ -162,8 +156,8 @@ fn monitoring(
     monitor: &'static mut Monitor,
     identity: Boot<'static>,
     cause: ResetCause,
+    out: MonitorEnds<'static>,
 ) -> &'static mut Monitoring<'static> {
-    MONITORING.init_with(|| {
-        Monitoring::new(monitor, WRITER.take(), identity, cause, &status::CARD_STATUS, &status::PORT_STATUS)
-    })
+    let (card, port) = (&status::CARD_STATUS, &status::PORT_STATUS);
+    MONITORING.init_with(|| Monitoring::new(monitor, WRITER.take(), identity, cause, card, port, out))
 }

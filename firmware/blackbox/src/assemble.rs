@@ -18,61 +18,54 @@ pub const PAGE_SECTORS: usize = 32;
 /// A page, and one sector more, which decides.
 const AHEAD_MAX: usize = PAGE_SECTORS + 1;
 
-/// Counts of blocks of 512 bytes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct BlockCounts {
-    /// All blocks.
-    pub blocks: u64,
-    /// Sectors given out.
-    pub sectors: u64,
-    /// Copies of a sector in progress that a fuller one supersedes, and sectors from before the log's first one, which
-    /// its file held before.
-    pub superseded: u64,
-    /// Complete sectors of this session that are duplicates or misplaced.
-    pub misplaced: u64,
-    /// Blocks apparently of this session with a wrong checksum: torn or damaged.
-    pub damaged: u64,
-    /// Valid sectors of another session, left from an earlier file.
-    pub stale: u64,
-    /// Blocks that begin like a sector, have a wrong checksum and apparently belong to an older session or to none.
-    pub unsound: u64,
-    /// Parity sectors of this session, sound or not; those of others are stale.
-    pub parity: u64,
-    /// Sectors rebuilt from parity, also counted by their kind.
-    pub repaired: u64,
-    /// All zeros.
-    pub empty: u64,
-    /// All ones: erased.
-    pub erased: u64,
-    /// Any other block, for example a sector of another format version.
-    pub foreign: u64,
-    /// Blocks of an older format version, which this build does not read, also counted as foreign.
-    pub older_version: u64,
-    /// Blocks of a newer version, or sealed ones.
-    pub newer_version: u64,
+macro_rules! block_counts {
+    ($($(#[$doc:meta])+ $name:ident,)+) => {
+        /// Counts of blocks of 512 bytes.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct BlockCounts {
+            $($(#[$doc])+ pub $name: u64,)+
+        }
+
+        impl BlockCounts {
+            /// Counts since `before`.
+            #[must_use]
+            pub const fn since(&self, before: &Self) -> Self {
+                Self { $($name: self.$name - before.$name,)+ }
+            }
+        }
+    };
 }
 
-impl BlockCounts {
-    /// Counts since `before`.
-    #[must_use]
-    pub const fn since(&self, before: &Self) -> Self {
-        Self {
-            blocks: self.blocks - before.blocks,
-            sectors: self.sectors - before.sectors,
-            superseded: self.superseded - before.superseded,
-            misplaced: self.misplaced - before.misplaced,
-            damaged: self.damaged - before.damaged,
-            stale: self.stale - before.stale,
-            unsound: self.unsound - before.unsound,
-            parity: self.parity - before.parity,
-            repaired: self.repaired - before.repaired,
-            empty: self.empty - before.empty,
-            erased: self.erased - before.erased,
-            foreign: self.foreign - before.foreign,
-            older_version: self.older_version - before.older_version,
-            newer_version: self.newer_version - before.newer_version,
-        }
-    }
+block_counts! {
+    /// All blocks.
+    blocks,
+    /// Sectors given out.
+    sectors,
+    /// Copies of a sector in progress that a fuller one supersedes, and sectors from before the log's first one, which
+    /// its file held before.
+    superseded,
+    /// Complete sectors of this session that are duplicates or misplaced.
+    misplaced,
+    /// Blocks apparently of this session with a wrong checksum: torn or damaged.
+    damaged,
+    /// Valid sectors of another session, left from an earlier file.
+    stale,
+    /// Blocks that begin like a sector, have a wrong checksum and apparently belong to an older session or to none.
+    unsound,
+    /// Parity sectors of this session, sound or not; those of others are stale.
+    parity,
+    /// Sectors rebuilt from parity, also counted by their kind.
+    repaired,
+    /// All zeros.
+    empty,
+    /// All ones: erased.
+    erased,
+    /// Any other block, for example a sector of another format version.
+    foreign,
+    /// Blocks of an older format version, which this build does not read, also counted as foreign.
+    older_version,
+    /// Blocks of a newer version, or sealed ones.
+    newer_version,
 }
 
 /// A sector in order.

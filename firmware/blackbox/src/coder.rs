@@ -6,6 +6,8 @@
 //! *State:* the interval `[low, low + range)` of 32-bit numbers that begin with the pending output. After each step
 //! `range >= 2^16`, so a symbol may have a probability down to 2^-16.
 
+use zerocopy::FromZeros;
+
 use crate::distribution::{Cdf, PROBABILITY_BITS};
 
 /// A top byte is settled when both ends of the interval share it.
@@ -31,16 +33,13 @@ const fn cut(low: u32, range: u32) -> Option<u32> {
     }
 }
 
+#[derive(FromZeros)]
 pub(crate) struct Scratch<const N: usize> {
     bytes: [u8; N],
     len: usize,
 }
 
 impl<const N: usize> Scratch<N> {
-    pub(crate) const fn new() -> Self {
-        Self { bytes: [0; N], len: 0 }
-    }
-
     pub(crate) fn clear(&mut self) {
         self.len = 0;
     }
@@ -65,16 +64,13 @@ impl<const N: usize> Scratch<N> {
     }
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, FromZeros)]
 pub(crate) struct Encoder {
     low: u32,
     range: u32,
 }
 
 impl Encoder {
-    /// All zeros: no group has begun.
-    pub(crate) const UNSET: Self = Self { low: 0, range: 0 };
-
     pub(crate) const fn new() -> Self {
         Self { low: 0, range: u32::MAX }
     }
@@ -323,7 +319,7 @@ mod tests {
     #[test]
     fn what_is_put_comes_out_also_after_a_flush_anywhere() {
         for count in 0..400 {
-            let (mut encoder, mut out) = (Encoder::new(), Scratch::<2_048>::new());
+            let (mut encoder, mut out) = (Encoder::new(), crate::zeros::<Scratch<2_048>>());
             let mut cdf = Cdf::FLAT;
             let value = |index: u32| index.wrapping_mul(2_654_435_761);
             let mut writing = SymbolWriter { encoder: &mut encoder, out: &mut out };

@@ -2,6 +2,8 @@
 
 mod at_once;
 
+use zerocopy::FromZeros;
+
 pub(crate) const SYMBOLS: usize = 16;
 
 pub(crate) const PROBABILITY_BITS: u32 = 16;
@@ -11,7 +13,7 @@ pub(crate) const PROBABILITY_BITS: u32 = 16;
 /// Place `i` (0 to 14) is the beginning of symbol `i + 1`, of 2^16. Place 15 counts the uses of the distribution, as
 /// far as the speed of adaptation depends on it. Two places are adapted in one step, as the halves of a word: most of
 /// the writer's time goes here.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, FromZeros)]
 #[repr(align(4))]
 pub(crate) struct Cdf([u16; SYMBOLS]);
 
@@ -64,8 +66,6 @@ const fn gains() -> [[Gains; SYMBOLS]; SPEED_LAST as usize] {
 }
 
 impl Cdf {
-    /// All zeros, an invalid distribution, as before the first reset of a model.
-    pub(crate) const UNSET: Self = Self([0; SYMBOLS]);
     /// All symbols alike.
     pub(crate) const FLAT: Self = Self::from_sizes([1; SYMBOLS]);
 
@@ -152,12 +152,10 @@ const fn rates() -> [i16; 16] {
 }
 
 /// Bits 4..=15: that the bit is one; bits 0..=3: the uses.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, FromZeros)]
 pub(crate) struct Cell(u16);
 
 impl Cell {
-    /// All zeros, as before the first reset of a model.
-    pub(crate) const UNSET: Self = Self(0);
     /// Zero and one alike.
     pub(crate) const EVEN: Self = Self(0x8000);
 

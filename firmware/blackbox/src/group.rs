@@ -10,6 +10,7 @@ use crate::limits::ENTRY_BYTES_MAX;
 use crate::preamble::{PREAMBLE_BYTES, Preamble};
 use crate::record::Record;
 use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, Sector};
+use crate::zeros;
 
 /// An entry of a group.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,20 +103,14 @@ pub struct GroupDecoder {
     apart: Option<usize>,
 }
 
-impl Default for GroupDecoder {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl GroupDecoder {
     /// Waits for a group.
     #[expect(clippy::large_stack_arrays, reason = "it is boxed by whoever makes one")]
     pub fn new() -> Self {
         Self {
-            model: Model::new(),
+            model: zeros(),
             recall: Recall::new(),
-            last_frames: [const { Frame::empty() }; SLOTS],
+            last_frames: zeros(),
             decoder: Decoder::new(&[], 0),
             input: [0; GROUP_SECTORS * BODY_BYTES],
             filled: 0,

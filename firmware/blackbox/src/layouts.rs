@@ -11,7 +11,10 @@
 //! ```
 //! The hash is the CRC-32C of the stored form.
 
+use core::num::NonZeroU16;
+
 use hums_dialect::{Kind, Message, Role};
+use zerocopy::FromZeros;
 
 use crate::crc::Crc32c;
 
@@ -36,16 +39,12 @@ pub fn store(mut out: impl FnMut(&[u8])) {
     }
 }
 
-/// A layout table.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Layouts {
-    Current,
-    Stored(&'static [u8]),
-}
+/// A layout table: this build's, or one of [`STORED`], counted from 1.
+#[derive(Clone, Copy, Debug, FromZeros)]
+pub(crate) struct Layouts(u8);
 
 /// Small enough for each slot.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct LayoutIndex(u16);
+pub(crate) type LayoutIndex = NonZeroU16;
 
 /// One message's layout.
 #[derive(Clone, Copy, Debug)]
@@ -56,26 +55,30 @@ pub(crate) enum Layout {
 }
 
 impl Layouts {
+    pub(crate) const CURRENT: Self = Self(0);
+
     pub(crate) fn by_hash(hash: u32) -> Option<Self> {
-        if hash == CURRENT {
-            return Some(Self::Current);
-        }
-        STORED.iter().find(|table| hash_of(table) == hash).map(|table| Self::Stored(table))
+        let stored = || STORED.iter().position(|table| hash_of(table) == hash);
+        if hash == CURRENT { Some(Self::CURRENT) } else { stored().map(|place| Self(place as u8 + 1)) }
+    }
+
+    fn stored(self) -> Option<&'static [u8]> {
+        STORED.get(usize::from(self.0).wrapping_sub(1)).copied()
     }
 
     pub(crate) fn find(self, id: u32) -> Option<LayoutIndex> {
-        let place = match self {
-            Self::Current => hums_dialect::messages().binary_search_by_key(&id, |message| message.id).ok()?,
-            Self::Stored(table) => find_stored(table, id)?,
+        let place = match self.stored() {
+            None => hums_dialect::messages().binary_search_by_key(&id, |message| message.id).ok()?,
+            Some(table) => find_stored(table, id)?,
         };
-        u16::try_from(place).ok().map(LayoutIndex)
+        NonZeroU16::new(u16::try_from(place + 1).ok()?)
     }
 
     pub(crate) fn at(self, place: LayoutIndex) -> Option<Layout> {
-        let place = usize::from(place.0);
-        match self {
-            Self::Current => hums_dialect::messages().get(place).map(Layout::Current),
-            Self::Stored(table) => table.get(place..).map(Layout::Stored),
+        let place = usize::from(place.get() - 1);
+        match self.stored() {
+            None => hums_dialect::messages().get(place).map(Layout::Current),
+            Some(table) => table.get(place..).map(Layout::Stored),
         }
     }
 }
@@ -169,18 +172,16 @@ mod tests {
 
     #[test]
     fn both_forms_of_the_table_say_the_same() {
-        let table = STORED[STORED.len() - 1];
+        let newest = Layouts(STORED.len() as u8);
+        let layout = |table: Layouts, id| table.find(id).and_then(|place| table.at(place));
         for message in hums_dialect::messages() {
-            let (a, b) = (
-                Layouts::Current.find(message.id).and_then(|place| Layouts::Current.at(place)),
-                Layouts::Stored(table).find(message.id).and_then(|place| Layouts::Stored(table).at(place)),
-            );
-            let (a, b) = (a.expect("in this build"), b.expect("stored"));
+            let a = layout(Layouts::CURRENT, message.id).expect("in this build");
+            let b = layout(newest, message.id).expect("stored");
             assert_eq!((a.crc_extra(), a.len_base()), (b.crc_extra(), b.len_base()));
             for index in 0..=message.fields.len() {
                 assert_eq!(a.field(index), b.field(index), "message {} field {index}", message.id);
             }
         }
-        assert!(Layouts::Stored(table).find(0x00ff_ffff).is_none());
+        assert!(newest.find(0x00ff_ffff).is_none());
     }
 }

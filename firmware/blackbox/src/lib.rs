@@ -38,6 +38,12 @@ pub use record::Record;
 pub use sector::{BODY_BYTES, GROUP_SECTORS, Header, NotASector, SECTOR_BYTES, Sector, VERSION};
 pub use writer::{Counters, ENTRY_SECTORS_MAX, Full, SectorSink, Writer};
 
+/// A value whose bytes are all zeros. As a static, it needs no image in flash.
+const fn zeros<T: zerocopy::FromZeros>() -> T {
+    // SAFETY: by the trait, zeros are a value of the type.
+    unsafe { core::mem::zeroed() }
+}
+
 /// Bytes: three quarters of the STM32F405's core-coupled memory.
 pub const WRITER_BYTES_MAX: usize = 48 * 1024;
 

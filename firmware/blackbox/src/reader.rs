@@ -143,12 +143,6 @@ enum State {
     Ended,
 }
 
-impl Default for LogReader {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl LogReader {
     /// Reads the session of the first sound sector.
     pub fn new() -> Self {

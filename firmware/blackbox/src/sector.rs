@@ -17,6 +17,8 @@
 //! it in its group are there. *Partial* marks a copy of a sector still in progress: a later, fuller version with the
 //! same number supersedes it. *Closed* marks the last sector of a session that ended in order.
 
+use zerocopy::FromZeros;
+
 use crate::crc::crc32c;
 use crate::preamble::Preamble;
 
@@ -160,7 +162,7 @@ impl Sector {
 }
 
 /// Header of a sector.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromZeros)]
 pub struct Header {
     /// Others are left over from an earlier file.
     pub session: u32,

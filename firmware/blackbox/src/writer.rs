@@ -7,6 +7,7 @@
 
 use hums_core::clock::Instant;
 use hums_dialect::wire::FRAME_BYTES_MAX;
+use zerocopy::FromZeros;
 
 use crate::bytes::copy_few;
 use crate::chain;
@@ -16,6 +17,7 @@ use crate::layouts::{self, Layouts};
 use crate::preamble::{PREAMBLE_BYTES, Preamble};
 use crate::record::{Mark, MarkReason, RECORD_BYTES_MAX, Record};
 use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, RECORDS_MAX, Sector};
+use crate::zeros;
 
 /// Maximum sectors that one entry completes: the last of the old group, and those of a longest entry with the
 /// preamble before it.
@@ -53,18 +55,12 @@ impl core::fmt::Display for Full {
 impl core::error::Error for Full {}
 
 /// Counters of the writer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromZeros)]
 pub struct Counters {
     /// Frames taken.
     pub frames: u64,
-    /// Their bytes.
-    pub frame_bytes: u64,
-    /// Records taken.
-    pub records: u64,
     /// Sectors finished.
     pub sectors: u64,
-    /// Entries refused.
-    pub refused: u64,
 }
 
 /// The writer with the model, the sector in progress and room for one coded entry.
@@ -89,16 +85,10 @@ pub struct Writer {
     counters: Counters,
 }
 
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Default, FromZeros)]
 struct EndedSector {
     frames: u16,
     records: u8,
-}
-
-impl Default for Writer {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 impl Writer {
@@ -106,30 +96,20 @@ impl Writer {
     /// group begins with a model made anew.
     pub const fn new() -> Self {
         Self {
-            model: Model::new(),
-            frame: Frame::empty(),
-            coder: Encoder::UNSET,
-            scratch: Out::new(),
+            model: zeros(),
+            frame: zeros(),
+            coder: zeros(),
+            scratch: zeros(),
             sector: Sector::zeroed(),
-            header: Header {
-                session: 0,
-                number: 0,
-                since_first: 0,
-                partial: false,
-                closed: false,
-                body_bytes: 0,
-                frames: 0,
-                records: 0,
-                check: 0,
-            },
-            ended: EndedSector { frames: 0, records: 0 },
+            header: zeros(),
+            ended: zeros(),
             chain: 0,
             chain_before: 0,
             in_group: false,
             changed: false,
             last_ms: 0,
             epoch_micros: None,
-            counters: Counters { frames: 0, frame_bytes: 0, records: 0, sectors: 0, refused: 0 },
+            counters: zeros(),
         }
     }
 
@@ -143,12 +123,10 @@ impl Writer {
         sink: &mut impl SectorSink,
     ) -> Result<(), Full> {
         if bytes.len() > FRAME_BYTES_MAX {
-            self.counters.refused += 1;
             return Err(Full::TooLong);
         }
         self.entry(at, Kind::Frame { verified }, bytes, sink)?;
         self.counters.frames += 1;
-        self.counters.frame_bytes += bytes.len() as u64;
         Ok(())
     }
 
@@ -161,14 +139,12 @@ impl Writer {
     ) -> Result<(), Full> {
         let mut stored = [0; RECORD_BYTES_MAX];
         let Some(stored) = record.store(&mut stored).ok().and_then(|len| stored.get(..len)) else {
-            self.counters.refused += 1;
             return Err(Full::TooLong);
         };
         self.entry(at, Kind::Record, stored, sink)?;
         if let Record::Clock(clock) = record {
             self.epoch_micros = Some(clock.epoch_micros());
         }
-        self.counters.records += 1;
         Ok(())
     }
 
@@ -222,7 +198,6 @@ impl Writer {
         sink: &mut impl SectorSink,
     ) -> Result<(), Full> {
         if sink.room() < ENTRY_SECTORS_MAX {
-            self.counters.refused += 1;
             return Err(Full::NoRoom);
         }
         self.last_ms = self.last_ms.max(self.millis(at));
@@ -339,7 +314,7 @@ impl Writer {
         (self.header.since_first, self.header.check) = (0, self.chain);
         self.sector.body_mut()[..PREAMBLE_BYTES].copy_from_slice(&preamble);
         self.header.body_bytes = PREAMBLE_BYTES;
-        self.model.reset(at_ms, Layouts::Current);
+        self.model.reset(at_ms, Layouts::CURRENT);
         self.coder = Encoder::new();
         self.in_group = true;
     }

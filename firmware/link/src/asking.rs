@@ -153,12 +153,6 @@ pub struct Asking {
     parameters: u32,
 }
 
-impl Default for Asking {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// Current state of the vehicle.
 #[derive(Clone, Copy, Debug)]
 pub struct KnownVehicle {

@@ -21,12 +21,6 @@ pub struct Encoder {
     sequence: u8,
 }
 
-impl Default for Encoder {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Encoder {
     /// Before the vehicle's system id is known.
     pub const fn new() -> Self {

@@ -44,8 +44,6 @@ pub struct FramerCounts {
     pub bytes: u64,
     /// Frames given to the sink, the unverified ones included.
     pub frames: u64,
-    /// Those of them whose definition we do not know.
-    pub unverified: u64,
     /// Frames with a wrong checksum. Damage to a start byte or a length shows only in `bytes_not_frames`.
     pub damaged: u64,
     /// Bytes of the frames given to the sink.
@@ -93,14 +91,7 @@ impl Framer {
             after_frame: true,
             credit: CREDIT_MAX,
             seen: VerifiedMessages::new(),
-            counts: FramerCounts {
-                bytes: 0,
-                frames: 0,
-                unverified: 0,
-                damaged: 0,
-                bytes_in_frames: 0,
-                bytes_not_frames: 0,
-            },
+            counts: FramerCounts { bytes: 0, frames: 0, damaged: 0, bytes_in_frames: 0, bytes_not_frames: 0 },
         }
     }
 
@@ -159,8 +150,6 @@ impl Framer {
                     let bytes = &self.buffer[self.start..self.start + len];
                     sink(Frame::from_parts(header, bytes, message));
                     self.counts.frames = self.counts.frames.wrapping_add(1);
-                    let unverified = u64::from(message.is_none());
-                    self.counts.unverified = self.counts.unverified.wrapping_add(unverified);
                     self.counts.bytes_in_frames = self.counts.bytes_in_frames.wrapping_add(len as u64);
                     self.consume(len);
                     self.after_frame = true;
@@ -269,12 +258,6 @@ impl Framer {
             self.damage_left = len;
         }
         Verdict::Skip(1)
-    }
-}
-
-impl Default for Framer {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

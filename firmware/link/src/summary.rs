@@ -154,7 +154,6 @@ pub struct Summary {
     next_value: usize,
     /// The most urgent first, then by age.
     waiting: heapless::Vec<Finding, WAITING_MAX>,
-    dropped: u32,
     telling: SentFindings,
     heartbeat_at: Option<Instant>,
 }
@@ -174,7 +173,6 @@ impl Summary {
             turns: [Turn { due_ms: 0, seen_ms: 0, bytes: 0, known: false }; TURNS],
             next_value: 0,
             waiting: heapless::Vec::new(),
-            dropped: 0,
             telling: SentFindings::new(),
             heartbeat_at: None,
         }
@@ -260,7 +258,6 @@ impl Summary {
             return;
         }
         if self.waiting.is_full() {
-            self.dropped = self.dropped.saturating_add(1);
             // The last one is the least urgent of those that wait.
             if self.waiting.last().is_some_and(|last| urgency(last) >= urgency(finding)) {
                 return;
@@ -365,11 +362,6 @@ impl Summary {
                 }
             }
         }
-    }
-
-    /// Findings that were dropped for more urgent ones.
-    pub const fn dropped(&self) -> u32 {
-        self.dropped
     }
 }
 

@@ -21,12 +21,6 @@ struct Armed {
     by: Option<Source>,
 }
 
-impl Default for ArmingWatch {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl ArmingWatch {
     /// Before the first byte.
     pub const fn new() -> Self {

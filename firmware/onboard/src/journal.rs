@@ -2,7 +2,7 @@
 
 use core::fmt::{Arguments, Write as _};
 
-use hums_blackbox::record::{Event, Loss, LossKind, MarkReason, Parameter, Record};
+use hums_blackbox::record::{Event, Loss, LossKind, MarkReason, Note, Parameter, Record};
 use hums_blackbox::{Counters, Sector, SectorSink as _, Writer};
 use hums_core::Monitor;
 use hums_core::clock::Instant;
@@ -13,10 +13,13 @@ use hums_recorder::status::CardStatus;
 
 use crate::ResetCause;
 use crate::loss::Losses;
+use crate::notices::{Notice, Notices};
 use crate::queues::SectorsIn;
 
 /// Number of the event that records an action over a link.
 const BY_HAND: u8 = 12;
+/// `MAV_SEVERITY` of texts that a pilot need not see, and of milder ones.
+const INFO: u8 = 6;
 
 /// Maximum age of a current heartbeat; autopilots send one each second.
 const HEARTBEAT_AGE_MAX: Millis = Millis::from_secs(3);
@@ -26,26 +29,27 @@ pub(crate) type By = (u8, u8);
 
 pub(crate) struct Journal<'a> {
     writer: &'a mut Writer,
+    sectors: SectorsIn<'a>,
     losses: Losses,
     refused: u64,
 }
 
 impl<'a> Journal<'a> {
-    pub(crate) const fn new(writer: &'a mut Writer) -> Self {
-        Self { writer, losses: Losses::new(), refused: 0 }
+    pub(crate) const fn new(writer: &'a mut Writer, sectors: SectorsIn<'a>) -> Self {
+        Self { writer, sectors, losses: Losses::new(), refused: 0 }
     }
 
     /// Unless only the reserve for records is left.
-    pub(crate) fn frame(&mut self, at: Instant, bytes: &[u8], verified: bool, sectors: &mut SectorsIn) {
-        if self.writer.frame(at, bytes, verified, sectors).is_err() {
+    pub(crate) fn frame(&mut self, at: Instant, bytes: &[u8], verified: bool) {
+        if self.writer.frame(at, bytes, verified, &mut self.sectors).is_err() {
             self.refused += 1;
             self.lose(at, LossKind::QueueFull, 1);
         }
     }
 
     /// If need be from the reserve; without room it counts as lost.
-    pub(crate) fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
-        let written = sectors.with_reserve(|sink| self.writer.record(now, record, sink)).is_ok();
+    pub(crate) fn record(&mut self, now: Instant, record: &Record<'_>) -> bool {
+        let written = self.sectors.with_reserve(|sink| self.writer.record(now, record, sink)).is_ok();
         if !written {
             self.lose(now, LossKind::Records, 1);
         }
@@ -53,15 +57,19 @@ impl<'a> Journal<'a> {
     }
 
     /// Without room never lost: it can be written later.
-    pub(crate) fn mark(&mut self, now: Instant, why: MarkReason, sectors: &mut SectorsIn) -> bool {
-        sectors.with_reserve(|sink| self.writer.mark(now, why, sink)).is_ok()
+    pub(crate) fn mark(&mut self, now: Instant, why: MarkReason) -> bool {
+        self.sectors.with_reserve(|sink| self.writer.mark(now, why, sink)).is_ok()
     }
 
     /// Text is cut after 50 characters.
-    pub(crate) fn by_hand(&mut self, now: Instant, what: Arguments<'_>, sectors: &mut SectorsIn) {
+    pub(crate) fn by_hand(&mut self, now: Instant, what: Arguments<'_>) {
         let mut text = Text::default();
         let _ = text.write_fmt(what);
-        self.record(now, &Record::Event(Event { number: BY_HAND, text: text.as_str() }), sectors);
+        self.event(now, BY_HAND, text.as_str());
+    }
+
+    pub(crate) fn event(&mut self, now: Instant, number: u8, text: &str) {
+        self.record(now, &Record::Event(Event { number, text }));
     }
 
     pub(crate) fn lose(&mut self, now: Instant, what: LossKind, count: u64) {
@@ -74,8 +82,8 @@ impl<'a> Journal<'a> {
     }
 
     #[inline(never)]
-    pub(crate) fn record_losses(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
-        let Self { losses, writer, .. } = self;
+    pub(crate) fn record_losses(&mut self, now: Instant, all: bool) {
+        let Self { losses, writer, sectors, .. } = self;
         let mut write =
             |loss: &Loss| sectors.with_reserve(|sink| writer.record(now, &Record::Loss(*loss), sink)).is_ok();
         losses.flush(now, all, &mut write);
@@ -90,17 +98,32 @@ impl<'a> Journal<'a> {
         self.writer.counters()
     }
 
-    /// The writer itself.
-    pub(crate) const fn writer(&mut self) -> &mut Writer {
-        self.writer
+    /// Queue of finished sectors.
+    pub(crate) const fn sectors(&self) -> &SectorsIn<'a> {
+        &self.sectors
+    }
+
+    /// Whether a copy of the sector in progress has room.
+    pub(crate) fn has_room(&mut self) -> bool {
+        self.sectors.with_reserve(|sink| sink.room()) > 0
+    }
+
+    /// The next entry begins a new group; `false` without room.
+    pub(crate) fn restart(&mut self) -> bool {
+        self.writer.restart(&mut self.sectors)
+    }
+
+    /// Ends the session in order.
+    pub(crate) fn finish(&mut self) {
+        self.sectors.with_reserve(|sink| self.writer.finish(sink));
     }
 
     /// A copy, if the queue has room and the sector a new entry.
     #[inline(never)]
-    pub(crate) fn partial(&mut self, sectors: &mut SectorsIn) {
+    pub(crate) fn partial(&mut self) {
         let mut copy = Sector::zeroed();
-        if sectors.with_reserve(|sink| sink.room()) > 0 && self.writer.partial(&mut copy) {
-            sectors.put(&copy);
+        if self.has_room() && self.writer.partial(&mut copy) {
+            self.sectors.put(&copy);
         }
     }
 }
@@ -109,6 +132,7 @@ pub(crate) struct Logbook<'a> {
     /// Lent, like the writer: both are too large to be moved over the firmware's stack.
     pub(crate) monitor: &'a mut Monitor,
     pub(crate) journal: Journal<'a>,
+    pub(crate) notices: Notices,
     pub(crate) card: &'a CardStatus,
     pub(crate) cause: ResetCause,
 }
@@ -124,6 +148,14 @@ pub(crate) enum Arming {
 }
 
 impl Logbook<'_> {
+    /// Records a text, and sends it unless it is milder than a notice; `severity` is a `MAV_SEVERITY`.
+    pub(crate) fn note(&mut self, now: Instant, severity: u8, text: &'static str) {
+        self.journal.record(now, &Record::Note(Note { severity, text }));
+        if severity < INFO {
+            self.notices.push(Notice::Text(severity, text));
+        }
+    }
+
     pub(crate) fn arming(&self, now: Instant) -> Arming {
         let heartbeat = &self.monitor.vehicle().heartbeat;
         match (heartbeat.get(), heartbeat.within(now.into(), HEARTBEAT_AGE_MAX)) {
@@ -149,14 +181,7 @@ impl Logbook<'_> {
 
     /// Sets a parameter for a ground station or the card's file: recorded, and in force at once. `false` if it is
     /// refused.
-    pub(crate) fn set_parameter(
-        &mut self,
-        now: Instant,
-        name: &str,
-        value: f32,
-        by: By,
-        sectors: &mut SectorsIn,
-    ) -> bool {
+    pub(crate) fn set_parameter(&mut self, now: Instant, name: &str, value: f32, by: By) -> bool {
         if !Param::find(name).is_some_and(|param| self.may_set(now, param)) {
             return false;
         }
@@ -167,7 +192,7 @@ impl Logbook<'_> {
         }
         if before != Some(value.to_bits()) {
             let parameter = Parameter { name, value: f64::from(value), changed: true, by };
-            self.journal.record(now, &Record::Parameter(parameter), sectors);
+            self.journal.record(now, &Record::Parameter(parameter));
         }
         true
     }

@@ -35,5 +35,5 @@ pub use persist::{Handover, Mailbox, StoreStatus, StoreWriter};
 pub use port::PortStatus;
 pub use reception::Reception;
 pub use reset::ResetCause;
-pub use storage::{Service, Storage};
+pub use storage::Service;
 pub use supervisor::{Supervisor, Task};

@@ -5,7 +5,6 @@
 
 use core::fmt::{self, Write as _};
 
-use hums_blackbox::record::{Note, Record};
 use hums_core::clock::{Instant, Span};
 use hums_core::mishap::{MishapChange, Report};
 use hums_core::protect::{Stage, Step};
@@ -14,14 +13,9 @@ use hums_link::outlet::{Class, Outlet};
 use hums_link::packet::Packet;
 use hums_link::statustext::{Severity, Text};
 
-use crate::journal::Journal;
-use crate::queues::SectorsIn;
-
 const WAITING_MAX: usize = 4;
 /// Time that a restart's text waits for a known vehicle.
 const UNKNOWN_MAX: Span = Span::from_secs(5);
-/// `MAV_SEVERITY` of texts that a pilot need not see, and of milder ones.
-const INFO: u8 = 6;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Notice {
@@ -42,21 +36,6 @@ impl Notices {
 
     pub(crate) fn push(&mut self, notice: Notice) {
         let _ = self.0.push(notice);
-    }
-
-    /// `severity` is a `MAV_SEVERITY`.
-    pub(crate) fn note(
-        &mut self,
-        now: Instant,
-        severity: u8,
-        text: &'static str,
-        journal: &mut Journal<'_>,
-        sectors: &mut SectorsIn,
-    ) {
-        journal.record(now, &Record::Note(Note { severity, text }), sectors);
-        if severity < INFO {
-            self.push(Notice::Text(severity, text));
-        }
     }
 
     /// A text of the protective action or a mishap, before all others.

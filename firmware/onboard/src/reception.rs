@@ -17,7 +17,7 @@ pub const SILENCE: Span = Span::from_millis(20);
 pub struct Reception<'a> {
     framer: Framer,
     status: &'a PortStatus,
-    frames_lost: u32,
+    frames_lost: u64,
 }
 
 impl<'a> Reception<'a> {
@@ -53,22 +53,25 @@ impl<'a> Reception<'a> {
     }
 
     fn publish(&self, frames: &FramesIn) {
-        self.status.set_queue_bytes_max(frames.bytes_max());
-        let counts = self.framer.counts();
-        // Truncated on purpose: the counters are modulo 2^32.
-        self.status.store(PortReading {
-            bytes: counts.bytes as u32,
-            bytes_not_frames: counts.bytes_not_frames as u32,
-            damaged: counts.damaged as u32,
-            frames: counts.frames as u32,
-            frames_lost: self.frames_lost,
-            overrun: 0, // Counted by the port itself, see `count_overrun`.
+        let (counts, frames_lost, queue_bytes_max) =
+            (self.framer.counts(), self.frames_lost, frames.bytes_max());
+        self.status.change(|port| {
+            *port = PortReading {
+                bytes: counts.bytes,
+                bytes_not_frames: counts.bytes_not_frames,
+                damaged: counts.damaged,
+                frames: counts.frames,
+                frames_lost,
+                queue_bytes_max,
+                // The port itself counts its overruns.
+                ..*port
+            };
         });
     }
 }
 
-fn queue(now: Instant, frame: &Frame, frames: &mut FramesIn, frames_lost: &mut u32) {
+fn queue(now: Instant, frame: &Frame, frames: &mut FramesIn, frames_lost: &mut u64) {
     if !frames.put(now.as_micros(), frame) {
-        *frames_lost = frames_lost.wrapping_add(1);
+        *frames_lost += 1;
     }
 }

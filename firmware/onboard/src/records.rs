@@ -8,7 +8,6 @@ use hums_core::clock::Instant;
 use hums_core::component::{COMPONENTS_MAX, Component, ComponentFigures, Label, Status};
 
 use crate::journal::{By, Logbook};
-use crate::queues::SectorsIn;
 
 /// A UTC that differs by more from the recorded one is recorded anew.
 const CLOCK_STEP_MICROS: u64 = 1_000_000;
@@ -56,28 +55,22 @@ impl RecordedState {
 
     /// The head of each file of a log: the recorder's identity and every parameter that is not at its default. A file
     /// that is read alone, after earlier ones were overwritten, misses only their time.
-    pub(crate) fn heading(
-        &mut self,
-        now: Instant,
-        identity: &Boot<'_>,
-        book: &mut Logbook<'_>,
-        sectors: &mut SectorsIn,
-    ) {
+    pub(crate) fn heading(&mut self, now: Instant, identity: &Boot<'_>, book: &mut Logbook<'_>) {
         let Logbook { monitor, journal, .. } = book;
-        journal.record(now, &Record::Boot(*identity), sectors);
+        journal.record(now, &Record::Boot(*identity));
         for (spec, value) in monitor.params().iter() {
             // Bit for bit: only a value that was set differs from its default.
             if value.to_bits() != spec.default.to_bits() {
                 let parameter =
                     Parameter { name: spec.name, value: f64::from(value), changed: false, by: (0, 0) };
-                journal.record(now, &Record::Parameter(parameter), sectors);
+                journal.record(now, &Record::Parameter(parameter));
             }
         }
         self.vehicle = VehicleRecord::default();
     }
 
     #[inline(never)]
-    pub(crate) fn vehicle(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
+    pub(crate) fn vehicle(&mut self, now: Instant, book: &mut Logbook<'_>) {
         let vehicle = book.monitor.vehicle();
         let (Some(source), Some(heartbeat)) = (vehicle.source, vehicle.heartbeat.get()) else { return };
         let identity = vehicle.identity.get().copied().unwrap_or_default();
@@ -89,13 +82,13 @@ impl RecordedState {
             firmware: identity.firmware,
             uid: identity.uid,
         };
-        if record != self.vehicle && book.journal.record(now, &Record::Vehicle(record), sectors) {
+        if record != self.vehicle && book.journal.record(now, &Record::Vehicle(record)) {
             self.vehicle = record;
         }
     }
 
     /// UTC as soon as the autopilot knows it, which dates the whole session.
-    pub(crate) fn clock(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
+    pub(crate) fn clock(&mut self, now: Instant, book: &mut Logbook<'_>) {
         let time = &book.monitor.vehicle().time;
         let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) else {
             return;
@@ -105,7 +98,7 @@ impl RecordedState {
         if self.epoch_micros.is_some_and(|known| known.abs_diff(epoch_micros) <= CLOCK_STEP_MICROS) {
             return;
         }
-        if book.journal.record(now, &Record::Clock(clock), sectors) {
+        if book.journal.record(now, &Record::Clock(clock)) {
             self.epoch_micros = Some(epoch_micros);
             book.card.set_utc_secs((utc_micros / 1_000_000).min(u64::from(u32::MAX)) as u32);
         }
@@ -115,51 +108,45 @@ impl RecordedState {
         self.usage_at
     }
 
-    pub(crate) fn usage_anew(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
+    pub(crate) fn usage_anew(&mut self, now: Instant, book: &mut Logbook<'_>) {
         self.usage_at = Instant::ZERO;
-        self.usage(now, Moment::Periodic, book, sectors);
+        self.usage(now, Moment::Periodic, book);
     }
 
     /// The session's counters, the airframe's life at the session's start and end, and exceedances.
-    pub(crate) fn usage(
-        &mut self,
-        now: Instant,
-        moment: Moment,
-        book: &mut Logbook<'_>,
-        sectors: &mut SectorsIn,
-    ) {
+    pub(crate) fn usage(&mut self, now: Instant, moment: Moment, book: &mut Logbook<'_>) {
         let before = core::mem::replace(&mut self.usage_at, now);
-        session(now, moment, book, sectors);
+        session(now, moment, book);
         if moment != Moment::Periodic {
-            life(now, moment, book, sectors);
+            life(now, moment, book);
             for place in 0..COMPONENTS_MAX {
                 let why = if moment == Moment::Start { RecordReason::Start } else { RecordReason::Status };
-                component(now, place, why, book, sectors);
+                component(now, place, why, book);
             }
         }
         let since = if moment == Moment::Periodic { before } else { Instant::ZERO };
-        exceedances(now, moment, since, book, sectors);
+        exceedances(now, moment, since, book);
     }
 }
 
 #[inline(never)]
-fn session(now: Instant, moment: Moment, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
+fn session(now: Instant, moment: Moment, book: &mut Logbook<'_>) {
     let Logbook { monitor, journal, .. } = book;
     let mut counters = Counters::new();
     let mut put = |part: &[_]| {
-        journal.record(now, &Record::Usage(Usage::new(moment, part)), sectors);
+        journal.record(now, &Record::Usage(Usage::new(moment, part)));
     };
     monitor.for_each_counter(|number, value| counters.push(number, value, &mut put));
     counters.flush(put);
 }
 
 #[inline(never)]
-fn life(now: Instant, moment: Moment, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
+fn life(now: Instant, moment: Moment, book: &mut Logbook<'_>) {
     let Logbook { monitor, journal, .. } = book;
     let life = monitor.lifetime();
     let mut counters = Counters::new();
     let mut put = |part: &[_]| {
-        journal.record(now, &Record::Lifetime(Lifetime::new(moment, &life, part)), sectors);
+        journal.record(now, &Record::Lifetime(Lifetime::new(moment, &life, part)));
     };
     life.totals.for_each(|number, value| counters.push(number, value, &mut put));
     counters.flush(put);
@@ -167,28 +154,22 @@ fn life(now: Instant, moment: Moment, book: &mut Logbook<'_>, sectors: &mut Sect
 
 /// At the start the exceedances of the airframe's life; later those of this session that changed.
 #[inline(never)]
-fn exceedances(
-    now: Instant,
-    moment: Moment,
-    since: Instant,
-    book: &mut Logbook<'_>,
-    sectors: &mut SectorsIn,
-) {
+fn exceedances(now: Instant, moment: Moment, since: Instant, book: &mut Logbook<'_>) {
     let Logbook { monitor, journal, .. } = book;
     for exceedance in monitor.exceedances().changed(now.into(), since.into()) {
         if moment == Moment::Start || exceedance.session.happened() {
-            journal.record(now, &Record::Exceedance(Exceedance::new(moment, &exceedance)), sectors);
+            journal.record(now, &Record::Exceedance(Exceedance::new(moment, &exceedance)));
         }
     }
 }
 
 #[inline(never)]
-fn component(now: Instant, place: usize, why: RecordReason, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
+fn component(now: Instant, place: usize, why: RecordReason, book: &mut Logbook<'_>) {
     let Logbook { monitor, journal, .. } = book;
     let Some((figures, status)) = monitor.component_figures(place) else { return };
     let used_percent = monitor.component_used_percent(place);
     let record = component_record(&monitor.components()[place], place, figures, status, used_percent, why);
-    journal.record(now, &Record::Component(record), sectors);
+    journal.record(now, &Record::Component(record));
 }
 
 /// Place from 0; records the old one; `false` if there is none.
@@ -198,7 +179,6 @@ pub(crate) fn replace_component(
     serial: &str,
     by: By,
     book: &mut Logbook<'_>,
-    sectors: &mut SectorsIn,
 ) -> bool {
     let Logbook { monitor, journal, .. } = book;
     let Some((_, status)) = monitor.component_figures(place) else { return false };
@@ -207,8 +187,8 @@ pub(crate) fn replace_component(
     let Some(old) = monitor.replace_component(place, serial) else { return false };
     let record = component_record(&old, place, old.ran, status, used_percent, RecordReason::Replaced);
     let record = ComponentRecord { by, new_serial: serial.as_str(), ..record };
-    journal.record(now, &Record::Component(record), sectors);
-    component(now, place, RecordReason::Status, book, sectors);
+    journal.record(now, &Record::Component(record));
+    component(now, place, RecordReason::Status, book);
     true
 }
 

@@ -4,10 +4,9 @@
 //! that stalls for 2.5 s.
 
 use hums_core::clock::{Instant, Span};
-use hums_recorder::{Buffers, CardDevice, CardStatus, Recorder, WaitReason};
+use hums_recorder::{CardDevice, Recorder, WaitReason};
 
 use crate::queues::SectorsOut;
-use crate::shelf::Server;
 
 /// How soon to call again after [`Service::NoCard`].
 pub const NO_CARD_RETRY: Span = Span::from_millis(100);
@@ -23,61 +22,33 @@ pub enum Service {
     NoCard,
 }
 
-/// The recorder with the reading end of its queue.
-pub struct Storage<'a, D: CardDevice> {
-    recorder: Recorder<'a, D>,
+/// Writes waiting sectors with at most one command.
+pub fn service<D: CardDevice>(
+    recorder: &mut Recorder<'_, D>,
+    now: Instant,
+    sectors: &mut SectorsOut,
+) -> Service {
+    if recorder.format(now) {
+        return Service::Wrote;
+    }
+    match sectors.lend(|waiting| recorder.write(now, waiting)) {
+        Ok(0) => {
+            recorder.idle();
+            Service::Idle
+        }
+        Ok(_) | Err(WaitReason::Searching) => Service::Wrote,
+        Err(WaitReason::Later) => Service::NoCard,
+    }
 }
 
-impl<'a, D: CardDevice> Storage<'a, D> {
-    /// See [`Recorder::new`].
-    pub const fn new(device: D, status: &'a CardStatus, held: &'a Buffers, entropy: u32) -> Self {
-        Self { recorder: Recorder::new(device, status, held, entropy) }
+/// Ends the session if no sector waits; whether it has ended. Ask for the end before this call: a sector that was queued
+/// before the request is then on the card.
+pub fn finish_after<D: CardDevice>(recorder: &mut Recorder<'_, D>, sectors: &SectorsOut) -> bool {
+    let is_last = sectors.is_empty();
+    if is_last {
+        recorder.finish();
     }
-
-    /// Writes waiting sectors with at most one command.
-    pub fn service(&mut self, now: Instant, sectors: &mut SectorsOut) -> Service {
-        if self.recorder.format(now) {
-            return Service::Wrote;
-        }
-        match sectors.lend(|waiting| self.recorder.write(now, waiting)) {
-            Ok(0) => {
-                self.recorder.idle();
-                Service::Idle
-            }
-            Ok(_) | Err(WaitReason::Searching) => Service::Wrote,
-            Err(WaitReason::Later) => Service::NoCard,
-        }
-    }
-
-    /// About the logs on the card; whether there was one. Only if [`Self::service`] found nothing to write.
-    pub fn serve(&mut self, shelf: &mut Server<'_>) -> bool {
-        shelf.serve(&mut self.recorder)
-    }
-
-    /// Ends the session after the last sector: the card can be pulled.
-    pub fn finish(&mut self) {
-        self.recorder.finish();
-    }
-
-    /// Ends the session if no sector waits; whether it has ended. Ask for the end before this call: a sector that was queued
-    /// before the request is then on the card.
-    pub fn finish_after(&mut self, sectors: &SectorsOut) -> bool {
-        let is_last = sectors.is_empty();
-        if is_last {
-            self.finish();
-        }
-        is_last
-    }
-
-    /// The recorder, for stored logs and for the card.
-    pub const fn recorder(&mut self) -> &mut Recorder<'a, D> {
-        &mut self.recorder
-    }
-
-    /// Gives the device back.
-    pub fn into_device(self) -> Option<D> {
-        self.recorder.into_device()
-    }
+    is_last
 }
 
 #[cfg(test)]
@@ -85,7 +56,7 @@ mod tests {
     use super::*;
     use crate::queues::Queues;
     use hums_blackbox::{Sector, SectorSink};
-    use hums_recorder::{BLOCK_BYTES, Block};
+    use hums_recorder::{BLOCK_BYTES, Block, Buffers, CardStatus};
 
     /// A slot without a card.
     struct Empty;
@@ -110,14 +81,14 @@ mod tests {
     fn a_log_ends_only_after_its_last_sector_whatever_the_card_does() {
         let (status, buffers, mut queues) =
             (CardStatus::new(), Box::new(Buffers::new()), Box::new(Queues::new()));
-        let mut ends = queues.split();
-        let mut storage = Storage::new(Empty, &status, &buffers, 1);
+        let (mut out, mut ends) = queues.split();
+        let mut recorder = Recorder::new(&Empty, &status, &buffers, 1);
         for second in 0..3 {
-            storage.service(Instant::from_millis(second * 1_000), &mut ends.sectors_out);
-            ends.sectors_in.put(&Sector::from_bytes([0; BLOCK_BYTES]));
-            assert!(!storage.finish_after(&ends.sectors_out));
+            service(&mut recorder, Instant::from_millis(second * 1_000), &mut ends.sectors_out);
+            out.sectors.put(&Sector::from_bytes([0; BLOCK_BYTES]));
+            assert!(!finish_after(&mut recorder, &ends.sectors_out));
         }
         ends.sectors_out.abandon();
-        assert!(storage.finish_after(&ends.sectors_out));
+        assert!(finish_after(&mut recorder, &ends.sectors_out));
     }
 }

@@ -63,26 +63,16 @@ impl Supervisor {
 
     /// `task` has looped.
     pub fn report(&self, task: Task, now: Instant) {
-        self.slot(task).store(now.as_millis() as u32, Ordering::Relaxed);
+        self.reported_ms[task as usize].store(now.as_millis() as u32, Ordering::Relaxed);
     }
 
     /// `None`: the watchdog may be fed.
     pub fn silent(&self, now: Instant) -> Option<Task> {
         let now_ms = now.as_millis() as u32;
         Task::ALL.into_iter().find(|task| {
-            let silent_ms = now_ms.wrapping_sub(self.slot(*task).load(Ordering::Relaxed));
+            let silent_ms = now_ms.wrapping_sub(self.reported_ms[*task as usize].load(Ordering::Relaxed));
             u64::from(silent_ms) > task.silence_max().as_millis()
         })
-    }
-
-    fn slot(&self, task: Task) -> &AtomicU32 {
-        let [reception, monitor, downlink, storage] = &self.reported_ms;
-        match task {
-            Task::Reception => reception,
-            Task::Monitor => monitor,
-            Task::Downlink => downlink,
-            Task::Storage => storage,
-        }
     }
 }
 

@@ -5,9 +5,8 @@
 //! * the start was not one that may have come in flight, such as a reset by the watchdog;
 //! * this image is confirmed, and the resident program has refused nothing since power-on, or since the card before.
 
-use core::sync::atomic::{AtomicU32, Ordering};
-
 use hums_core::clock::{Instant, Span};
+use hums_recorder::shared::Shared;
 use hums_recorder::{BLOCK_BYTES, CardDevice, CardState, CardStatus, Recorder};
 use hums_update::header::{self, Header, NO_WISH, Refusal};
 use hums_update::message::Message;
@@ -21,16 +20,8 @@ const SILENT: Span = Span::from_secs(60);
 /// A new image records for so long before it is confirmed.
 pub const TRIAL: Span = Span::from_secs(60);
 
-const NOTHING: u32 = 0;
-const OFFERED: u32 = 1;
-/// And the number of the refusal.
-const REFUSED: u32 = 0x10;
-
-/// Storage's findings for the monitor.
-#[derive(Debug, Default)]
-pub struct UpdateStatus {
-    found: AtomicU32,
-}
+/// The update file of the card, for the monitor.
+pub type UpdateStatus = Shared<Option<UpdateOffer>>;
 
 /// An update file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,31 +30,6 @@ pub enum UpdateOffer {
     Offered,
     /// It is not for this board now.
     Refused(Refusal),
-}
-
-impl UpdateStatus {
-    /// No file.
-    pub const fn new() -> Self {
-        Self { found: AtomicU32::new(NOTHING) }
-    }
-
-    fn set(&self, found: Option<UpdateOffer>) {
-        let kind = match found {
-            None => NOTHING,
-            Some(UpdateOffer::Offered) => OFFERED,
-            Some(UpdateOffer::Refused(why)) => REFUSED + why as u32,
-        };
-        self.found.store(kind, Ordering::Relaxed);
-    }
-
-    /// The update file of the card.
-    pub fn read(&self) -> Option<UpdateOffer> {
-        match self.found.load(Ordering::Relaxed) {
-            NOTHING => None,
-            OFFERED => Some(UpdateOffer::Offered),
-            kind => Some(UpdateOffer::Refused(*Refusal::ALL.get(kind.wrapping_sub(REFUSED) as usize)?)),
-        }
-    }
 }
 
 /// The running image.
@@ -110,18 +76,19 @@ impl UpdateSearch {
     ) {
         let Some(card) = recorder.card() else {
             self.has_looked = false;
-            status.set(None);
+            status.change(|found| *found = None);
             return;
         };
         if core::mem::replace(&mut self.has_looked, true) {
             return;
         }
-        let Some((mut segment, bytes)) = card.update() else { return status.set(None) };
         let mut block = [0; BLOCK_BYTES];
-        status.set(match card.read(&mut segment, 0, &mut block) {
-            Ok(()) => judge(&block, bytes, running),
-            Err(_) => Some(UpdateOffer::Refused(Refusal::NoFile)),
-        });
+        let offer =
+            card.update().and_then(|(mut segment, bytes)| match card.read(&mut segment, 0, &mut block) {
+                Ok(()) => judge(&block, bytes, running),
+                Err(_) => Some(UpdateOffer::Refused(Refusal::NoFile)),
+            });
+        status.change(|found| *found = offer);
     }
 
     /// Whether the image has recorded for long enough to be confirmed.
@@ -207,7 +174,7 @@ impl UpdateWatch {
         now: Instant,
         status: &UpdateStatus,
         calm: EraseMoment,
-        frames: u32,
+        frames: u64,
         on_trial: bool,
     ) -> bool {
         let is_silent =
@@ -294,7 +261,7 @@ mod tests {
 
     #[test]
     fn an_update_waits_for_the_ground_and_never_begins_after_a_start_that_may_be_in_flight() {
-        let status = UpdateStatus::new();
+        let status = UpdateStatus::default();
         let due = |message, cause, secs: u64, calm, frames, trial| {
             UpdateWatch::new(message, cause).is_due(
                 Instant::from_millis(secs * 1_000),
@@ -306,7 +273,7 @@ mod tests {
         };
         let power = ResetCause::PowerOn;
         assert!(!due(None, power, 100, EraseMoment::Grounded, 9, false), "there is no file");
-        status.set(Some(UpdateOffer::Offered));
+        status.change(|found| *found = Some(UpdateOffer::Offered));
         let refused = Some(Message::Refused(Refusal::BadSignature));
         for (message, cause, secs, calm, frames, trial, wanted) in [
             (None, power, 12, EraseMoment::Grounded, 9, false, true),
@@ -328,7 +295,7 @@ mod tests {
 
     #[test]
     fn each_result_is_told_once_and_a_text_fits_the_line() {
-        let status = UpdateStatus::new();
+        let status = UpdateStatus::default();
         for why in Refusal::ALL {
             assert!(text(why).len() <= 50, "{}", text(why));
             let mut watch = UpdateWatch::new(Some(Message::Refused(why)), ResetCause::Update);
@@ -339,7 +306,7 @@ mod tests {
         assert_eq!(watch.news(&status), Some((5, "HUMS: update installed, on trial for a minute")));
         assert_eq!((watch.news(&status), watch.is_refused()), (None, false));
         for found in [UpdateOffer::Refused(Refusal::OtherBoard), UpdateOffer::Refused(Refusal::TooOld)] {
-            status.set(Some(found));
+            status.change(|offer| *offer = Some(found));
             assert!(watch.news(&status).is_some());
             assert_eq!((watch.news(&status), watch.is_refused()), (None, true));
         }
@@ -347,12 +314,12 @@ mod tests {
 
     #[test]
     fn another_card_ends_a_refusal() {
-        let status = UpdateStatus::new();
+        let status = UpdateStatus::default();
         let refused = Some(Message::Refused(Refusal::BadSignature));
         let mut watch = UpdateWatch::new(refused, ResetCause::Update);
         let later = Instant::from_millis(100_000);
         let mut due = |found| {
-            status.set(found);
+            status.change(|offer| *offer = found);
             while watch.news(&status).is_some() {}
             (watch.is_due(later, &status, EraseMoment::Grounded, 9, false), watch.is_refused())
         };

@@ -19,19 +19,18 @@ pub const SILENCE: Span = Span::from_millis(100);
 pub struct Uplink {
     port: Port,
     framer: Framer,
-    frames_lost: u32,
 }
 
 impl Uplink {
     /// Before the first byte.
     pub const fn new(port: Port) -> Self {
-        Self { port, framer: Framer::new(), frames_lost: 0 }
+        Self { port, framer: Framer::new() }
     }
 
     /// Queues each frame that these bytes complete.
     pub fn bytes(&mut self, bytes: &[u8], frames: &UplinkIn) {
-        let Self { port, framer, frames_lost } = self;
-        framer.push(bytes, &mut |frame| queue(*port, &frame, frames, frames_lost));
+        let Self { port, framer } = self;
+        framer.push(bytes, &mut |frame| queue(*port, &frame, frames));
     }
 
     /// Room for the next bytes; see [`Framer::room`].
@@ -41,24 +40,18 @@ impl Uplink {
 
     /// Takes the first `count` bytes of [`Self::room`] as [`Self::bytes`] does.
     pub fn received(&mut self, count: usize, frames: &UplinkIn) {
-        let Self { port, framer, frames_lost } = self;
-        framer.received(count, &mut |frame| queue(*port, &frame, frames, frames_lost));
+        let Self { port, framer } = self;
+        framer.received(count, &mut |frame| queue(*port, &frame, frames));
     }
 
     /// The line has been silent: decides about bytes that wait for more.
     pub fn idle(&mut self, frames: &UplinkIn) {
-        let Self { port, framer, frames_lost } = self;
-        framer.idle(&mut |frame| queue(*port, &frame, frames, frames_lost));
-    }
-
-    /// The queue was full; modulo 2^32.
-    pub const fn frames_lost(&self) -> u32 {
-        self.frames_lost
+        let Self { port, framer } = self;
+        framer.idle(&mut |frame| queue(*port, &frame, frames));
     }
 }
 
-fn queue(port: Port, frame: &Frame<'_>, frames: &UplinkIn, frames_lost: &mut u32) {
-    if !frames.put(port as u64, frame) {
-        *frames_lost = frames_lost.wrapping_add(1);
-    }
+/// A station repeats a request that found the queue full.
+fn queue(port: Port, frame: &Frame<'_>, frames: &UplinkIn) {
+    let _ = frames.put(port as u64, frame);
 }

@@ -15,7 +15,7 @@ use crate::free::{FreeSearch, chain_free, free_chain, write_hint};
 use crate::layout::{Layout, LayoutError};
 use crate::name::LogName;
 use crate::recorder::Buffers;
-use crate::status::{CardStatus, CardUsage};
+use crate::status::CardStatus;
 use crate::volume::Volume;
 use crate::{BLOCK_BYTES, Block, CardDevice};
 
@@ -98,25 +98,22 @@ pub struct Card<'a, D> {
 }
 
 impl<'a, D: CardDevice> Card<'a, D> {
-    /// On failure the device comes back with the reason.
+    /// Examines the card, and walks over its directory once.
     pub fn mount(
-        device: D,
+        device: &'a D,
         status: &'a CardStatus,
         buffers: &'a Buffers,
-    ) -> Result<Self, (D, CardError<D::Error>)> {
-        let layout = match Layout::read(&device) {
-            Ok(layout) => layout,
-            Err(LayoutError::Device(error)) => return Err((device, CardError::Device(error))),
-            Err(why) => return Err((device, CardError::Foreign(why))),
-        };
+    ) -> Result<Self, CardError<D::Error>> {
+        let layout = Layout::read(device).map_err(|error| match error {
+            LayoutError::Device(error) => CardError::Device(error),
+            why => CardError::Foreign(why),
+        })?;
         let volume = Volume::new(device, status, layout);
         let free = FreeSearch::new(&volume);
         let directory = Directory::new(layout.root);
         let mut card = Self { volume, directory, free, status, buffers, open: None };
-        match card.begin() {
-            Ok(()) => Ok(card),
-            Err(error) => Err((card.unmount(), error)),
-        }
+        card.begin()?;
+        Ok(card)
     }
 
     /// Walks over the directory. Without a free cluster in the information sector, the clusters behind all logs come first.
@@ -126,12 +123,8 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.free.begin(&self.volume, self.directory.claimed_end())
     }
 
-    pub(crate) fn unmount(self) -> D {
-        self.volume.into_device()
-    }
-
     /// The device, for accesses besides files.
-    pub const fn device(&self) -> &D {
+    pub const fn device(&self) -> &'a D {
         self.volume.device()
     }
 
@@ -486,18 +479,18 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.read(core::slice::from_mut(block), start)
     }
 
-    /// Counts the share of the card that logs can have, one block of the FAT per call. Returns the result at the last
-    /// block.
-    pub(crate) fn count_room(&mut self) -> Result<Option<CardUsage>, CardError<D::Error>> {
-        let Some(free) = self.free.count(&self.volume)? else { return Ok(None) };
+    /// Counts the share of the card that logs can have, one block of the FAT per call. Publishes the result at the last
+    /// block, and returns whether it was that.
+    pub(crate) fn count_room(&mut self) -> Result<bool, CardError<D::Error>> {
+        let Some(free) = self.free.count(&self.volume)? else { return Ok(false) };
         let Layout { clusters, cluster_blocks, .. } = self.volume.layout;
         let for_logs = u64::from(free) + u64::from(self.directory.clusters);
         let mib = |clusters: u32| (u64::from(clusters) * u64::from(cluster_blocks) / BLOCKS_PER_MIB) as u32;
-        Ok(Some(CardUsage {
-            permille: (for_logs * 1000 / u64::from(clusters)).min(1000) as u32,
-            used_mib: mib(clusters.saturating_sub(free)),
-            total_mib: mib(clusters),
-        }))
+        self.status.change(|card| {
+            card.room_permille = Some((for_logs * 1000 / u64::from(clusters)).min(1000) as u32);
+            card.storage_mib = Some((mib(clusters.saturating_sub(free)), mib(clusters)));
+        });
+        Ok(true)
     }
 }
 

@@ -28,6 +28,7 @@ pub mod layout;
 mod name;
 mod parity;
 pub mod recorder;
+pub mod shared;
 pub mod spi;
 pub mod status;
 mod volume;

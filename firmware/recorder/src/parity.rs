@@ -17,12 +17,6 @@ pub(crate) struct Parity {
     since: Option<Instant>,
 }
 
-impl Default for Parity {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Parity {
     pub(crate) const fn new() -> Self {
         Self {

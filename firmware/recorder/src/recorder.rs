@@ -14,7 +14,6 @@
 
 mod before;
 mod segments;
-mod socket;
 mod trouble;
 
 use core::cell::RefCell;
@@ -25,12 +24,11 @@ use hums_blackbox::{GROUP_SECTORS, Sector};
 use hums_core::clock::{Instant, Span};
 
 use crate::card::{Card, CardError};
-use crate::format::FormatError;
+use crate::format::{FormatError, Formatting};
 use crate::name::LogName;
 use crate::parity::Parity;
 use crate::status::{CardState, CardStatus};
 use segments::{Log, NewestCopy, Segments};
-use socket::Socket;
 use trouble::may_work_elsewhere;
 
 const RETRY: Span = Span::from_secs(1);
@@ -66,7 +64,6 @@ pub const ROW_BLOCKS: usize = 4;
 
 /// The parity buffer, 8 KiB. It is lent, because the recorder is moved and would take it along on the firmware's
 /// stack.
-#[derive(Default)]
 pub struct Buffers {
     pub(crate) parity: RefCell<Parity>,
 }
@@ -87,7 +84,9 @@ impl Buffers {
 pub struct Recorder<'a, D: CardDevice> {
     status: &'a CardStatus,
     buffers: &'a Buffers,
-    socket: Socket<'a, D>,
+    device: &'a D,
+    card: Option<Card<'a, D>>,
+    formatting: Option<Formatting>,
     retry_at: Instant,
     /// The card was changed within a group: on the new card nothing is readable before the next group.
     await_group: bool,
@@ -99,12 +98,13 @@ pub struct Recorder<'a, D: CardDevice> {
 impl<'a, D: CardDevice> Recorder<'a, D> {
     /// A recorder for the card in `device`. `entropy` distinguishes sessions of equal number on equal cards: a random
     /// number, or any number that changes with each power-on.
-    pub const fn new(device: D, status: &'a CardStatus, buffers: &'a Buffers, entropy: u32) -> Self {
-        let socket = Socket::Waiting(device);
+    pub const fn new(device: &'a D, status: &'a CardStatus, buffers: &'a Buffers, entropy: u32) -> Self {
         Self {
             status,
             buffers,
-            socket,
+            device,
+            card: None,
+            formatting: None,
             retry_at: Instant::ZERO,
             await_group: false,
             segments: Segments::new(status, entropy),
@@ -115,26 +115,33 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     fn ready(&mut self, now: Instant) -> Result<(), WaitReason> {
         self.begin_service();
-        if !self.socket.is_mounted() {
+        if self.card.is_none() {
             if self.finished || now < self.retry_at {
                 return Err(WaitReason::Later);
             }
             self.retry_at = now + RETRY;
-            match self.socket.mount(self.status, self.buffers) {
-                Ok(true) => {}
-                Ok(false) => return Err(WaitReason::Later),
-                Err(error) => {
-                    self.tell(&error);
-                    return Err(WaitReason::Later);
-                }
+            if self.formatting.is_some() {
+                return Err(WaitReason::Later);
+            }
+            if let Err(error) = self.mount() {
+                self.tell(&error);
+                return Err(WaitReason::Later);
             }
             (self.segments.is_open, self.room_known) = (false, false);
-            self.status.set_room(None);
+            self.status.change(|card| (card.room_permille, card.storage_mib) = (None, None));
         }
         if self.segments.is_open {
             return Ok(());
         }
         self.begin().map_err(|error| self.not_yet(now, &error))
+    }
+
+    // Not inlined: a moved card must not lie on the stack below later calls.
+    #[inline(never)]
+    fn mount(&mut self) -> Result<(), CardError<D::Error>> {
+        self.device.reset();
+        self.card = Some(Card::mount(self.device, self.status, self.buffers)?);
+        Ok(())
     }
 
     /// Writes waiting sectors: the first, and with the same command those that belong right behind it. Returns the
@@ -146,7 +153,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.await_group &= !first.starts_group();
         if self.await_group {
             if !first.is_partial() {
-                self.status.count_lost_sector(u32::from(first.frames()));
+                self.status.change(|card| {
+                    card.sectors_lost += 1;
+                    card.frames_lost += u32::from(first.frames());
+                });
             }
             return Ok(1);
         }
@@ -178,43 +188,33 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 
     fn count_retries(&self) {
-        self.status.count_write_errors(self.socket.take_retries());
+        self.status.count_write_errors(self.device.take_retries());
     }
 
     /// Work for times without writes: finds the end of the previous session, dates the segment, and continues the
     /// count of room. The first needs a sector of this session on the card, the second the date.
     pub fn idle(&mut self) {
-        let Some(card) = self.socket.card() else { return };
+        let Some(card) = &mut self.card else { return };
         if self.segments.has_sector() {
             self.segments.look_before(card);
             self.segments.date(card);
         }
         let _ = card.look_ahead();
-        if self.room_known {
-            return;
-        }
-        match card.count_room() {
-            Ok(None) => {}
-            Ok(room) => {
-                self.status.set_room(room);
-                self.room_known = true;
-            }
-            Err(_) => self.room_known = true,
-        }
+        // An error ends the count.
+        self.room_known = self.room_known || !matches!(card.count_room(), Ok(false));
     }
 
     /// The card can be pulled.
     pub fn finish(&mut self) {
         self.finished = true;
         self.write_parity();
-        if self.socket.is_mounted() {
+        if self.card.take().is_some() {
             self.status.set_state(CardState::Finished);
         }
-        self.socket.release();
     }
 
     fn open_segment(&self) -> Option<Log> {
-        self.segments.log.filter(|_| self.socket.is_mounted() && self.segments.is_open)
+        self.segments.log.filter(|_| self.card.is_some() && self.segments.is_open)
     }
 
     /// The name of the segment in work.
@@ -231,12 +231,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// The card, for stored logs; `None` without one.
     pub const fn card(&mut self) -> Option<&mut Card<'a, D>> {
-        self.socket.card()
-    }
-
-    /// Gives the device back, with its card.
-    pub fn into_device(self) -> Option<D> {
-        self.socket.into_device()
+        self.card.as_mut()
     }
 
     /// Formats the card on request, a little at each call; returns whether to call again at once. All data on the
@@ -244,24 +239,31 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     pub fn format(&mut self, now: Instant) -> bool {
         if self.status.take_format_wanted() && !self.finished {
             self.retry_at = now + RETRY;
-            if self.socket.begin_format(self.segments.volume_id(now)) {
+            // A card that could be mounted since the command is never formatted.
+            if self.card.is_none() && self.formatting.is_none() {
+                self.device.recheck();
+                self.formatting = Some(Formatting::new(self.segments.volume_id(now)));
                 self.status.set_state(CardState::Formatting);
             }
         }
         self.begin_service();
-        match self.socket.format() {
-            None => return false,
-            Some(Ok(false)) => {}
-            Some(Ok(true)) => self.retry_at = now,
-            Some(Err(FormatError::Device(error))) => self.tell(&CardError::Device(error)),
-            Some(Err(FormatError::TooSmall)) => self.status.set_state(CardState::Foreign),
+        let Some(formatting) = &mut self.formatting else { return false };
+        let done = formatting.step(self.device);
+        if !matches!(done, Ok(false)) {
+            self.formatting = None;
+        }
+        match done {
+            Ok(false) => {}
+            Ok(true) => self.retry_at = now,
+            Err(FormatError::Device(error)) => self.tell(&CardError::Device(error)),
+            Err(FormatError::TooSmall) => self.status.set_state(CardState::Foreign),
         }
         true
     }
 
     fn begin_service(&self) {
         self.status.begin_service();
-        self.socket.begin_service();
+        self.device.begin_service();
     }
 
     fn try_write(
@@ -332,7 +334,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         let buffers = self.buffers;
         let mut parity = buffers.parity.borrow_mut();
         let Some(Log { session, base: Some(base), .. }) = self.segments.log else { return };
-        let Some(card) = self.socket.card().filter(|_| parity.is_due()) else { return };
+        let Some(card) = self.card.as_mut().filter(|_| parity.is_due()) else { return };
         let mut at = parity_block(card.open_blocks(), parity.stretch());
         let mut blocks = parity.blocks(session, base);
         while !blocks.is_empty() {
@@ -376,7 +378,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// Just mounted.
     fn begin(&mut self) -> Result<(), CardError<D::Error>> {
-        let card = self.socket.card().ok_or(CardError::NotOpen)?;
+        let card = self.card.as_mut().ok_or(CardError::NotOpen)?;
         let begun = self.segments.begin(card);
         self.buffers.parity.borrow_mut().begin(0);
         self.await_group = begun?;
@@ -385,7 +387,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     fn next_segment(&mut self, is_short: bool) -> Result<(), CardError<D::Error>> {
         self.write_parity();
-        let next = self.segments.next(is_short, self.socket.card().ok_or(CardError::NotOpen)?);
+        let next = self.segments.next(is_short, self.card.as_mut().ok_or(CardError::NotOpen)?);
         self.buffers.parity.borrow_mut().begin(0);
         next
     }
@@ -410,7 +412,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
         self.tell(error);
         self.retry_at = now + RETRY;
-        self.socket.release();
+        self.card = None;
         WaitReason::Later
     }
 

@@ -1,41 +1,38 @@
-//! Status of the storage task, and requests to it: plain atomics, so that neither side ever waits.
+//! Status of the storage task, and requests to it.
 
-use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
-
-use hums_blackbox::record::{LastSession, PreviousEnd};
+use hums_blackbox::record::LastSession;
 use hums_core::clock::{Instant, Span};
 
-const IDLE: u32 = u32::MAX;
-const UNCOUNTED: u32 = u32::MAX;
+use crate::shared::Shared;
 
-/// The state of the card. The numbers are stored in logs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
+/// The state of the card.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CardState {
     /// Not looked at yet.
-    Unknown = 0,
+    #[default]
+    Unknown,
     /// A session is being recorded.
-    Recording = 1,
+    Recording,
     /// No card, or it does not answer.
-    Absent = 2,
+    Absent,
     /// A card whose first partition is neither FAT32 nor exFAT. Like the next three: never formatted unasked.
-    Foreign = 3,
+    Foreign,
     /// No free clusters, and no log of ours to overwrite.
-    Full = 4,
+    Full,
     /// The card answers but does not take blocks.
-    Failing = 5,
+    Failing,
     /// The session was finished.
-    Finished = 6,
+    Finished,
     /// The card is write protected, or locked with a password.
-    Locked = 7,
+    Locked,
     /// The card is exFAT (or NTFS), as cards of more than 32 GB are when they are new.
-    ExFat = 8,
+    ExFat,
     /// The card has no partition table; its data, if any, is of unknown kind.
-    Unpartitioned = 9,
+    Unpartitioned,
     /// A FAT32 volume whose structures are damaged.
-    Damaged = 10,
+    Damaged,
     /// The card is being formatted on request.
-    Formatting = 11,
+    Formatting,
 }
 
 impl CardState {
@@ -43,74 +40,14 @@ impl CardState {
     pub const fn wants_format(self) -> bool {
         matches!(self, Self::Foreign | Self::ExFat | Self::Unpartitioned | Self::Damaged)
     }
-
-    /// Unknown numbers included.
-    pub const fn from_number(number: u8) -> Self {
-        match number {
-            1 => Self::Recording,
-            2 => Self::Absent,
-            3 => Self::Foreign,
-            4 => Self::Full,
-            5 => Self::Failing,
-            6 => Self::Finished,
-            7 => Self::Locked,
-            8 => Self::ExFat,
-            9 => Self::Unpartitioned,
-            10 => Self::Damaged,
-            11 => Self::Formatting,
-            _ => Self::Unknown,
-        }
-    }
 }
 
-/// Shared by the storage task, which writes it, and the monitor, which reads it; the three `request`-like fields at the
-/// end go the other way.
-#[derive(Debug)]
-pub struct CardStatus {
-    state: AtomicU8,
-    session: AtomicU32,
-    segments: AtomicU32,
-    segments_overwritten: AtomicU32,
-    blocks_written: AtomicU32,
-    writes: AtomicU32,
-    write_errors: AtomicU32,
-    frames_lost: AtomicU32,
-    sectors_lost: AtomicU32,
-    stall_ms_max: AtomicU32,
-    /// Start of the running command, milliseconds modulo 2^32; [`IDLE`] between commands.
-    busy_since_ms: AtomicU32,
-    /// The longest command of the present service: its start and its duration.
-    longest_since_ms: AtomicU32,
-    longest_ms: AtomicU32,
-    /// The volume's serial number.
-    volume: AtomicU32,
-    /// Thousandths of the card that logs can have.
-    room: AtomicU32,
-    used_mib: AtomicU32,
-    total_mib: AtomicU32,
-    group_wanted: AtomicBool,
-    format_wanted: AtomicBool,
-    fat_time: AtomicU32,
-    /// The previous session on this card: whether it is unread, and the result.
-    before_news: AtomicBool,
-    before_found: AtomicU8,
-    before_number: AtomicU32,
-    before_session: AtomicU32,
-    before_sectors: AtomicU32,
-    before_frames: AtomicU32,
-    before_check: AtomicU32,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct CardUsage {
-    pub(crate) permille: u32,
-    /// Used space, logs included, in MiB.
-    pub(crate) used_mib: u32,
-    pub(crate) total_mib: u32,
-}
+/// Written by the storage task and read by the monitor. The monitor's requests go the other way.
+#[derive(Default)]
+pub struct CardStatus(Shared<CardReading>);
 
 /// A reading of [`CardStatus`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CardReading {
     /// The state of the card.
     pub state: CardState,
@@ -139,197 +76,141 @@ pub struct CardReading {
     pub room_permille: Option<u32>,
     /// Used space at that count, logs included, and total space, in MiB.
     pub storage_mib: Option<(u32, u32)>,
-}
-
-impl Default for CardStatus {
-    fn default() -> Self {
-        Self::new()
-    }
+    /// Start of the running command in milliseconds; `None` between commands.
+    busy_since_ms: Option<u64>,
+    /// The longest command of the present service: its start and its duration.
+    longest_ms: (u64, u64),
+    group_wanted: bool,
+    format_wanted: bool,
+    utc_secs: u32,
+    /// The previous session on this card, until it was read.
+    before: Option<LastSession>,
 }
 
 impl CardStatus {
     /// Before the card was looked at.
     pub const fn new() -> Self {
-        Self {
-            state: AtomicU8::new(CardState::Unknown as u8),
-            session: AtomicU32::new(0),
-            segments: AtomicU32::new(0),
-            segments_overwritten: AtomicU32::new(0),
-            blocks_written: AtomicU32::new(0),
-            writes: AtomicU32::new(0),
-            write_errors: AtomicU32::new(0),
-            frames_lost: AtomicU32::new(0),
-            sectors_lost: AtomicU32::new(0),
-            stall_ms_max: AtomicU32::new(0),
-            busy_since_ms: AtomicU32::new(IDLE),
-            longest_since_ms: AtomicU32::new(0),
-            longest_ms: AtomicU32::new(0),
-            volume: AtomicU32::new(0),
-            room: AtomicU32::new(UNCOUNTED),
-            used_mib: AtomicU32::new(0),
-            total_mib: AtomicU32::new(0),
-            group_wanted: AtomicBool::new(false),
-            format_wanted: AtomicBool::new(false),
-            fat_time: AtomicU32::new(0),
-            before_news: AtomicBool::new(false),
-            before_found: AtomicU8::new(PreviousEnd::Unknown as u8),
-            before_number: AtomicU32::new(0),
-            before_session: AtomicU32::new(0),
-            before_sectors: AtomicU32::new(0),
-            before_frames: AtomicU32::new(0),
-            before_check: AtomicU32::new(0),
-        }
+        Self(Shared::new(CardReading {
+            state: CardState::Unknown,
+            session: 0,
+            segments: 0,
+            segments_overwritten: 0,
+            blocks_written: 0,
+            writes: 0,
+            write_errors: 0,
+            frames_lost: 0,
+            sectors_lost: 0,
+            stall_ms_max: 0,
+            volume: 0,
+            room_permille: None,
+            storage_mib: None,
+            busy_since_ms: None,
+            longest_ms: (0, 0),
+            group_wanted: false,
+            format_wanted: false,
+            utc_secs: 0,
+            before: None,
+        }))
     }
 
-    /// The values; each may be of another moment.
+    /// The values of this moment.
     pub fn read(&self) -> CardReading {
-        CardReading {
-            state: CardState::from_number(self.state.load(Ordering::Relaxed)),
-            session: self.session.load(Ordering::Relaxed),
-            segments: self.segments.load(Ordering::Relaxed),
-            segments_overwritten: self.segments_overwritten.load(Ordering::Relaxed),
-            blocks_written: self.blocks_written.load(Ordering::Relaxed),
-            writes: self.writes.load(Ordering::Relaxed),
-            write_errors: self.write_errors.load(Ordering::Relaxed),
-            frames_lost: self.frames_lost.load(Ordering::Relaxed),
-            sectors_lost: self.sectors_lost.load(Ordering::Relaxed),
-            stall_ms_max: self.stall_ms_max.load(Ordering::Relaxed),
-            volume: self.volume.load(Ordering::Relaxed),
-            room_permille: Some(self.room.load(Ordering::Relaxed)).filter(|room| *room != UNCOUNTED),
-            storage_mib: Some((
-                self.used_mib.load(Ordering::Relaxed),
-                self.total_mib.load(Ordering::Relaxed),
-            ))
-            .filter(|(_, total)| *total > 0),
-        }
+        self.0.read()
+    }
+
+    pub(crate) fn change<R>(&self, change: impl FnOnce(&mut CardReading) -> R) -> R {
+        self.0.change(change)
     }
 
     /// Sets the state.
     pub fn set_state(&self, state: CardState) {
-        self.state.store(state as u8, Ordering::Relaxed);
+        self.change(|card| card.state = state);
     }
 
     /// Sets the serial number of the opened volume.
     pub fn set_volume(&self, volume: u32) {
-        self.volume.store(volume, Ordering::Relaxed);
-    }
-
-    pub(crate) fn begin_segment(&self, session: u32, overwrote: bool) {
-        self.session.store(session, Ordering::Relaxed);
-        self.segments.fetch_add(1, Ordering::Relaxed);
-        self.segments_overwritten.fetch_add(u32::from(overwrote), Ordering::Relaxed);
+        self.change(|card| card.volume = volume);
     }
 
     pub(crate) fn count_blocks(&self, blocks: u32) {
-        self.blocks_written.fetch_add(blocks, Ordering::Relaxed);
-        self.writes.fetch_add(1, Ordering::Relaxed);
+        self.change(|card| {
+            card.blocks_written += blocks;
+            card.writes += 1;
+        });
     }
 
     pub(crate) fn count_write_errors(&self, errors: u32) {
-        self.write_errors.fetch_add(errors, Ordering::Relaxed);
-    }
-
-    pub(crate) fn count_lost_sector(&self, frames: u32) {
-        self.sectors_lost.fetch_add(1, Ordering::Relaxed);
-        self.frames_lost.fetch_add(frames, Ordering::Relaxed);
-    }
-
-    /// `None`: not counted.
-    pub(crate) fn set_room(&self, room: Option<CardUsage>) {
-        let room = room.unwrap_or(CardUsage { permille: UNCOUNTED, used_mib: 0, total_mib: 0 });
-        self.used_mib.store(room.used_mib, Ordering::Relaxed);
-        self.total_mib.store(room.total_mib, Ordering::Relaxed);
-        self.room.store(room.permille, Ordering::Relaxed);
+        self.change(|card| card.write_errors += errors);
     }
 
     pub(crate) fn begin_service(&self) {
-        self.longest_ms.store(0, Ordering::Relaxed);
+        self.change(|card| card.longest_ms = (0, 0));
     }
 
     /// A command begins; [`Self::end_command`] is to follow.
     pub(crate) fn begin_command(&self, now: Instant) {
-        self.busy_since_ms.store((now.as_millis() as u32).min(IDLE - 1), Ordering::Relaxed);
+        self.change(|card| card.busy_since_ms = Some(now.as_millis()));
     }
 
     pub(crate) fn end_command(&self, now: Instant) {
-        let since_ms = self.busy_since_ms.swap(IDLE, Ordering::Relaxed);
-        let took_ms = (now.as_millis() as u32).wrapping_sub(since_ms);
-        self.stall_ms_max.fetch_max(took_ms, Ordering::Relaxed);
-        if took_ms > self.longest_ms.load(Ordering::Relaxed) {
-            self.longest_since_ms.store(since_ms, Ordering::Relaxed);
-            self.longest_ms.store(took_ms, Ordering::Relaxed);
-        }
+        self.change(|card| {
+            let Some(since_ms) = card.busy_since_ms.take() else { return };
+            let took_ms = now.as_millis().saturating_sub(since_ms);
+            card.stall_ms_max = card.stall_ms_max.max(took_ms as u32);
+            if took_ms > card.longest_ms.1 {
+                card.longest_ms = (since_ms, took_ms);
+            }
+        });
     }
 
     /// Duration of the running command so far; zero between commands. Commands of a simulated card end in the future;
     /// of those the longest one of the service counts.
     pub fn stall(&self, now: Instant) -> Span {
-        // A command is far shorter than the 49 days after which the number repeats.
-        let since = |since_ms: u32| (now.as_millis() as u32).wrapping_sub(since_ms);
-        let ms = match self.busy_since_ms.load(Ordering::Relaxed) {
-            IDLE => {
-                let ms = since(self.longest_since_ms.load(Ordering::Relaxed));
-                if ms < self.longest_ms.load(Ordering::Relaxed) { ms } else { 0 }
-            }
-            since_ms => since(since_ms),
-        };
-        Span::from_millis(u64::from(ms))
+        let CardReading { busy_since_ms, longest_ms: (longest_since_ms, longest_ms), .. } = self.read();
+        let ago_ms = now.as_millis().saturating_sub(busy_since_ms.unwrap_or(longest_since_ms));
+        Span::from_millis(if busy_since_ms.is_some() || ago_ms < longest_ms { ago_ms } else { 0 })
     }
 
     /// The next data is readable without earlier sectors.
     pub fn want_group(&self) {
-        self.group_wanted.store(true, Ordering::Release);
+        self.change(|card| card.group_wanted = true);
     }
 
     /// A group requested since the last call.
     pub fn take_group_wanted(&self) -> bool {
-        self.group_wanted.swap(false, Ordering::Acquire)
+        self.change(|card| core::mem::take(&mut card.group_wanted))
     }
 
     /// Requests that the present card be formatted.
     pub fn want_format(&self) {
-        self.format_wanted.store(true, Ordering::Release);
+        self.change(|card| card.format_wanted = true);
     }
 
     pub(crate) fn take_format_wanted(&self) -> bool {
-        self.format_wanted.swap(false, Ordering::Acquire)
+        self.change(|card| core::mem::take(&mut card.format_wanted))
     }
 
-    pub(crate) fn set_before(&self, before: &LastSession) {
-        self.before_found.store(before.found as u8, Ordering::Relaxed);
-        self.before_number.store(before.number, Ordering::Relaxed);
-        self.before_session.store(before.session, Ordering::Relaxed);
-        self.before_sectors.store(before.sectors, Ordering::Relaxed);
-        self.before_frames.store(before.frames, Ordering::Relaxed);
-        self.before_check.store(before.check, Ordering::Relaxed);
-        self.before_news.store(true, Ordering::Release);
+    pub(crate) fn set_before(&self, before: LastSession) {
+        self.change(|card| card.before = Some(before));
     }
 
-    /// The previous session, once for each card that is opened. The fields are stable until the next card: storage
-    /// looks for one once a second.
+    /// The previous session, once for each card that is opened.
     pub fn take_before(&self) -> Option<LastSession> {
-        self.before_news.swap(false, Ordering::Acquire).then(|| LastSession {
-            found: PreviousEnd::from_number(self.before_found.load(Ordering::Relaxed)),
-            number: self.before_number.load(Ordering::Relaxed),
-            session: self.before_session.load(Ordering::Relaxed),
-            sectors: self.before_sectors.load(Ordering::Relaxed),
-            frames: self.before_frames.load(Ordering::Relaxed),
-            check: self.before_check.load(Ordering::Relaxed),
-        })
+        self.change(|card| card.before.take())
     }
 
     /// The date for directory entries, seconds since 1970 UTC.
     pub fn set_utc_secs(&self, utc_secs: u32) {
-        self.fat_time.store(utc_secs, Ordering::Relaxed);
+        self.change(|card| card.utc_secs = utc_secs);
     }
 
     /// Time and date for a directory entry: UTC once it is known, 1 January 1980 (FAT's zero) before.
     pub(crate) fn fat_date(&self) -> [u8; 4] {
-        fat_date(self.fat_time.load(Ordering::Relaxed))
+        fat_date(self.read().utc_secs)
     }
 
     pub(crate) fn is_utc_known(&self) -> bool {
-        self.fat_time.load(Ordering::Relaxed) != 0
+        self.read().utc_secs != 0
     }
 }
 

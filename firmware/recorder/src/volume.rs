@@ -13,21 +13,17 @@ pub(crate) const ENTRIES: u32 = 128;
 pub(crate) const END_OF_CHAIN: u32 = 0x0FFF_FFFF;
 
 pub(crate) struct Volume<'a, D> {
-    device: D,
+    device: &'a D,
     status: &'a CardStatus,
     pub(crate) layout: Layout,
 }
 
 impl<'a, D: CardDevice> Volume<'a, D> {
-    pub(crate) const fn new(device: D, status: &'a CardStatus, layout: Layout) -> Self {
+    pub(crate) const fn new(device: &'a D, status: &'a CardStatus, layout: Layout) -> Self {
         Self { device, status, layout }
     }
 
-    pub(crate) const fn device(&self) -> &D {
-        &self.device
-    }
-
-    pub(crate) fn into_device(self) -> D {
+    pub(crate) const fn device(&self) -> &'a D {
         self.device
     }
 
@@ -52,7 +48,7 @@ impl<'a, D: CardDevice> Volume<'a, D> {
 
     fn command<T>(&self, act: impl FnOnce(&D) -> Result<T, D::Error>) -> Result<T, CardError<D::Error>> {
         self.status.begin_command(self.device.now());
-        let done = act(&self.device);
+        let done = act(self.device);
         self.status.end_command(self.device.now());
         done.map_err(CardError::Device)
     }

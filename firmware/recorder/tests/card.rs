@@ -11,8 +11,8 @@ use hums_recorder::{BLOCK_BYTES, Block, CardState, CardStatus, LogName};
 const FIRST: LogName = LogName { session: 1, segment: 0 };
 const SECOND: LogName = LogName { session: 2, segment: 0 };
 
-fn mount<'a>(card: &MemCard, status: &'a CardStatus) -> Card<'a, MemCard> {
-    Card::mount(card.clone(), status, held()).map_err(|(_, error)| error).expect("the card mounts")
+fn mount<'a>(card: &'a MemCard, status: &'a CardStatus) -> Card<'a, MemCard> {
+    Card::mount(card, status, held()).expect("the card mounts")
 }
 
 fn logs(card: &Card<'_, MemCard>) -> Vec<LogEntry> {
@@ -212,8 +212,7 @@ fn a_directory_of_more_than_a_cluster_grows() {
 #[test]
 fn cards_that_cannot_be_used_are_told_and_left_alone() {
     let status = CardStatus::new();
-    let reason =
-        |card: &MemCard| Card::mount(card.clone(), &status, held()).map_err(|(_, error)| error).err();
+    let reason = |card: &MemCard| Card::mount(card, &status, held()).err();
     let empty = MemCard::new(64 * MIB_BLOCKS);
     assert_eq!(reason(&empty), Some(CardError::Foreign(LayoutError::NoPartitionTable)));
     let damage = |at: u32, offset: usize, bytes: &[u8]| {
@@ -270,7 +269,7 @@ fn a_fat_full_of_nonsense_is_an_error_and_never_a_panic() {
             let mut blocks = device.blocks.borrow_mut();
             blocks.entry(at).or_insert([0; 512])[offset..offset + 4].copy_from_slice(&value.to_le_bytes());
         }
-        if let Ok(mut card) = Card::mount(device.clone(), &status, held()) {
+        if let Ok(mut card) = Card::mount(&device, &status, held()) {
             let _ = card.logs(|_| {});
             let _ = card.create(SECOND, 512 * 1024);
             let _ = card.open(FIRST);

@@ -70,7 +70,7 @@ fn write_all(recorder: &mut Recorder<'_, impl CardDevice>, sectors: &[Sector]) {
 
 fn stored(device: &MemCard) -> Vec<(LogName, u32, Header)> {
     let status = CardStatus::new();
-    let card = Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
+    let card = Card::mount(device, &status, held()).expect("it mounts");
     let mut names = Vec::new();
     card.logs(|entry| names.push(entry.name)).expect("it lists");
     names.sort_unstable();
@@ -100,7 +100,7 @@ fn numbers(device: &MemCard) -> Vec<u32> {
 fn a_card_that_comes_back_goes_on_where_it_was() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let mut recorder = Recorder::new(&device, &status, held(), 7);
     let all = sectors(2_000);
     let mut now_ms = 0;
     for (index, sector) in all.iter().enumerate() {
@@ -123,7 +123,7 @@ fn a_card_that_comes_back_goes_on_where_it_was() {
 fn a_segment_that_the_card_made_and_did_not_say_so_is_of_the_session() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let mut recorder = Recorder::new(&device, &status, held(), 7);
     let (all, unsaid) = (sectors(2_000), LogName { session: 1, segment: 1 });
     let mut now_ms = 0;
     for (index, sector) in all.iter().enumerate() {
@@ -147,7 +147,7 @@ fn on_another_card_the_next_group_begins_a_session_and_the_rest_is_counted() {
     hums_recorder::format::format(&second, 99).expect("it formats");
     let slot = Slot(Rc::new(RefCell::new(first.clone())));
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(slot.clone(), &status, held(), 7);
+    let mut recorder = Recorder::new(&slot, &status, held(), 7);
     let all = sectors(2_000);
     for sector in &all[..100] {
         assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
@@ -189,7 +189,7 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
     let status = CardStatus::new();
     let sessions = 40;
     for session in 0..sessions {
-        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        let mut recorder = Recorder::new(&device, &status, held(), session);
         for sector in sectors(100) {
             assert_eq!(put(&mut recorder, Instant::ZERO, &sector), Ok(1));
         }
@@ -202,7 +202,7 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
     assert!(status.read().segments_overwritten > 0);
     // A card whose logs must stay.
     device.keeps_logs.set(true);
-    let mut recorder = Recorder::new(device.clone(), &status, held(), sessions);
+    let mut recorder = Recorder::new(&device, &status, held(), sessions);
     assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Err(WaitReason::Later));
     assert_eq!((status.read().state, names()), (CardState::Full, before));
 }
@@ -211,14 +211,13 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
 fn a_card_without_room_or_logs_is_told_full() {
     let device = MemCard::formatted(40 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut card =
-        Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
+    let mut card = Card::mount(&device, &status, held()).expect("it mounts");
     let name = LogName { session: 5, segment: 0 };
     card.create(name, (card.layout().data_bytes() - 1_024) as u32).expect("it fits");
     let root = card.layout().data_start;
     drop(card);
     device.blocks.borrow_mut().get_mut(&root).expect("the directory")[8..11].copy_from_slice(b"JPG");
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
+    let mut recorder = Recorder::new(&device, &status, held(), 1);
     assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Err(WaitReason::Later));
     assert_eq!(status.read().state, CardState::Full);
 }
@@ -228,7 +227,7 @@ fn no_log_is_overwritten_while_there_is_room_that_nothing_points_to() {
     let device = MemCard::formatted(40 * MIB_BLOCKS);
     let record = |session: u32| {
         let status = CardStatus::new();
-        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        let mut recorder = Recorder::new(&device, &status, held(), session);
         assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Ok(1));
         recorder.finish();
         status.read().segments_overwritten
@@ -252,7 +251,7 @@ fn no_log_is_overwritten_while_there_is_room_that_nothing_points_to() {
 fn a_torn_partial_never_takes_the_older_copy_with_it() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
+    let mut recorder = Recorder::new(&device, &status, held(), 1);
     let (mut writer, mut sink) = (Box::new(Writer::new()), Sink(Vec::new()));
     let mut places = Vec::new();
     for copy in 0..4 {
@@ -273,7 +272,7 @@ fn a_torn_whole_sector_never_takes_the_newest_copy_with_it() {
     for copies in 1..5_u64 {
         let device = MemCard::formatted(64 * MIB_BLOCKS);
         let status = CardStatus::new();
-        let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
+        let mut recorder = Recorder::new(&device, &status, held(), 1);
         let (mut writer, mut sink) = (Box::new(Writer::new()), Sink(Vec::new()));
         let mut frames = 0;
         for copy in 0..copies {
@@ -298,7 +297,7 @@ fn a_torn_whole_sector_never_takes_the_newest_copy_with_it() {
 fn sectors_that_wait_together_are_written_together() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let mut recorder = Recorder::new(&device, &status, held(), 7);
     let all = sectors(2_000);
     assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0), "the segment is made");
     device.writes.set(0);
@@ -314,7 +313,7 @@ fn sectors_that_wait_together_are_written_together() {
 fn a_write_that_fails_half_way_is_repeated_from_its_first_sector() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let mut recorder = Recorder::new(&device, &status, held(), 7);
     let all = sectors(60);
     assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0), "the segment is made");
     device.fail_after.set(Some(5));
@@ -328,7 +327,7 @@ fn a_write_that_fails_half_way_is_repeated_from_its_first_sector() {
 fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut earlier = Recorder::new(device.clone(), &status, held(), 1);
+    let mut earlier = Recorder::new(&device, &status, held(), 1);
     for sector in sectors(100) {
         assert_eq!(put(&mut earlier, Instant::ZERO, &sector), Ok(1));
     }
@@ -337,7 +336,7 @@ fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
 
     device.refused_permille.set(200);
     for session in 2..8 {
-        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        let mut recorder = Recorder::new(&device, &status, held(), session);
         for row in sectors(2_000).chunks(8) {
             assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0), "the segment is made");
             write_all(&mut recorder, row);
@@ -357,7 +356,7 @@ fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
 fn lost_pages_are_made_again_from_parity() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let mut recorder = Recorder::new(&device, &status, held(), 7);
     let all = sectors(6_000);
     let (mut left, mut now) = (all.len() - 1, Instant::ZERO);
     for (index, sector) in all[..left].iter().enumerate() {
@@ -368,7 +367,7 @@ fn lost_pages_are_made_again_from_parity() {
         assert_eq!(put(&mut recorder, now, sector), Ok(1));
     }
     let status = CardStatus::new();
-    let card = Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
+    let card = Card::mount(&device, &status, held()).expect("it mounts");
     let mut segment = card.segment(LogName { session: 1, segment: 0 }).expect("it is there");
     let blocks = segment.blocks();
     let mut read = |at: u32| {
@@ -412,7 +411,7 @@ fn the_next_start_finds_where_the_session_before_ended() {
     for count in [0_u32, 1, 7, 100, 2_000, 30_000] {
         let device = MemCard::formatted(64 * MIB_BLOCKS);
         let status = CardStatus::new();
-        let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+        let mut recorder = Recorder::new(&device, &status, held(), 7);
         let all = sectors(count);
         let written = if count == 0 { &[] } else { &all[..all.len() - 1] };
         assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0), "the segment is made");
@@ -433,7 +432,7 @@ fn the_next_start_finds_where_the_session_before_ended() {
         let expected = LastSession { found: PreviousEnd::Frames, number: 1, session, sectors, frames, check };
         assert_eq!(before, expected, "{count} frames");
         assert_eq!(
-            Recorder::new(device.clone(), &CardStatus::new(), held(), 9).write(Instant::ZERO, &mut []),
+            Recorder::new(&device, &CardStatus::new(), held(), 9).write(Instant::ZERO, &mut []),
             Ok(0)
         );
         let again = found_at_next_start(&device);
@@ -451,7 +450,7 @@ fn check_of(sector: &Sector) -> u32 {
 fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let mut recorder = Recorder::new(&device, &status, held(), 7);
     let all = sectors(4_000);
     for sector in &all[..all.len() - 1] {
         assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
@@ -488,7 +487,7 @@ fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
     for older_sessions in [0, 20] {
         let device = MemCard::formatted(40 * MIB_BLOCKS);
         for session in 0..older_sessions {
-            let mut recorder = Recorder::new(device.clone(), leaked(), held(), session);
+            let mut recorder = Recorder::new(&device, leaked(), held(), session);
             for sector in sectors(300) {
                 assert_eq!(put(&mut recorder, Instant::ZERO, &sector), Ok(1));
             }
@@ -539,7 +538,7 @@ fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
 
 fn record_files(device: &MemCard) -> u32 {
     let status = leaked();
-    let mut recorder = Recorder::new(device.clone(), status, held(), 99);
+    let mut recorder = Recorder::new(device, status, held(), 99);
     let (mut writer, mut sink) = (Box::new(Writer::new()), Sink(Vec::new()));
     let mut partial = Sector::zeroed();
     let mut state = 1_u32;
@@ -572,13 +571,13 @@ fn the_session_before_is_looked_for_once_the_first_sector_is_on_the_card() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let all = sectors(2_000);
     let earlier = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &earlier, held(), 7);
+    let mut recorder = Recorder::new(&device, &earlier, held(), 7);
     for sector in &all {
         assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
     }
     drop(recorder);
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 8);
+    let mut recorder = Recorder::new(&device, &status, held(), 8);
     assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0));
     recorder.idle();
     assert_eq!(status.take_before(), None, "there is no sector yet");
@@ -595,8 +594,7 @@ fn the_session_before_is_looked_for_once_the_first_sector_is_on_the_card() {
 fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
     let device = MemCard::formatted(40 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut card =
-        Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
+    let mut card = Card::mount(&device, &status, held()).expect("it mounts");
     card.create(LogName { session: 5, segment: 0 }, (card.layout().data_bytes() - 1_024) as u32)
         .expect("it fits");
     let all = sectors(200);
@@ -606,7 +604,7 @@ fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
         card.write(at, &[*sealed.bytes()]).expect("in place");
     }
     drop(card);
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
+    let mut recorder = Recorder::new(&device, &status, held(), 1);
     for sector in &all {
         assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
         recorder.idle();
@@ -619,7 +617,7 @@ fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
 fn found_at_next_start(device: &MemCard) -> LastSession {
     let whole = device.blocks.borrow().clone();
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 8);
+    let mut recorder = Recorder::new(device, &status, held(), 8);
     assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(1)[0]), Ok(1));
     recorder.idle();
     device.blocks.replace(whole);
@@ -631,7 +629,7 @@ fn a_folder_with_the_name_of_the_next_log_is_passed_by() {
     let device = MemCard::formatted(40 * MIB_BLOCKS);
     let record = |session| {
         let status = CardStatus::new();
-        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        let mut recorder = Recorder::new(&device, &status, held(), session);
         assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Ok(1));
         recorder.log_name().expect("it records").session
     };
@@ -651,7 +649,7 @@ fn a_log_that_lost_its_part_of_the_fat_is_not_written_anew() {
     let device = MemCard::formatted(40 * MIB_BLOCKS);
     let record = |session, frames: u32| {
         let status = CardStatus::new();
-        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        let mut recorder = Recorder::new(&device, &status, held(), session);
         let done = sectors(frames).iter().all(|sector| put(&mut recorder, Instant::ZERO, sector) == Ok(1));
         (done, recorder.log_name().map(|name| name.segment), status.read().state)
     };
@@ -664,8 +662,7 @@ fn a_log_that_lost_its_part_of_the_fat_is_not_written_anew() {
     assert_eq!(record(16, 1000), (true, Some(0), CardState::Recording));
     let names = || {
         let status = CardStatus::new();
-        let card =
-            Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
+        let card = Card::mount(&device, &status, held()).expect("it mounts");
         let mut names = Vec::new();
         card.logs(|entry| names.push(entry.name.session)).expect("it lists");
         names.sort_unstable();
@@ -684,7 +681,7 @@ fn a_card_that_logs_fill_is_not_searched() {
     let device = MemCard::formatted(34 * MIB_BLOCKS);
     for session in 0..18 {
         let status = CardStatus::new();
-        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        let mut recorder = Recorder::new(&device, &status, held(), session);
         let before = device.reads.get();
         assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Ok(1));
         assert_eq!(status.read().segments_overwritten, u32::from(session >= 15));
@@ -699,7 +696,7 @@ fn a_command_to_format_is_not_for_a_card_that_is_mounted_by_then() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let formatted = std::mem::take(&mut *device.blocks.borrow_mut());
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let mut recorder = Recorder::new(&device, &status, held(), 7);
     assert_eq!(recorder.write(Instant::ZERO, &mut []), Err(WaitReason::Later));
     assert!(status.read().state.wants_format(), "{:?}", status.read().state);
     status.want_format();

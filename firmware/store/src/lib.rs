@@ -20,7 +20,7 @@
 
 mod key;
 #[cfg(test)]
-mod power_cuts;
+mod power_cut_tests;
 mod sector;
 #[cfg(any(test, feature = "sim"))]
 pub mod sim;

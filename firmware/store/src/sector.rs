@@ -18,6 +18,7 @@
 //! Bits only go from 1 to 0, so a partly written last word has all ones of the correct one ([`Check::Cut`]). Any other invalid
 //! item is damage.
 
+use crc::{CRC_32_ISCSI, Crc};
 use embedded_storage::nor_flash::NorFlash;
 
 use crate::key::Key;
@@ -148,17 +149,17 @@ impl<'f, F: NorFlash> Sector<'f, F> {
     }
 
     pub(crate) fn append(&mut self, at: usize, key: Key, value: &[u8]) -> Result<(), F::Error> {
-        let mut crc = Crc::new();
+        let mut crc = CRC.digest();
         for (place, word) in [coded(value.len() as u16), key.stored()].into_iter().enumerate() {
-            crc.add(word);
+            crc.update(&word.to_le_bytes());
             self.write_word(at + place * WORD, word)?;
         }
         for (place, bytes) in value.chunks(WORD).enumerate() {
             let word = bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte));
-            crc.add(word);
+            crc.update(&word.to_le_bytes());
             self.write_word(at + (2 + place) * WORD, word)?;
         }
-        self.write_word(at + 2 * WORD + value.len().next_multiple_of(WORD), crc.check())
+        self.write_word(at + 2 * WORD + value.len().next_multiple_of(WORD), check_of(crc.finalize()))
     }
 
     /// Complete or not.
@@ -172,13 +173,13 @@ impl<'f, F: NorFlash> Sector<'f, F> {
     }
 
     fn check(&mut self, item: &Item) -> Result<Check, F::Error> {
-        let mut crc = Crc::new();
+        let mut crc = CRC.digest();
         let last = item.end() - WORD;
         for at in (item.at..last).step_by(WORD) {
-            crc.add(self.word(at)?);
+            crc.update(&self.word(at)?.to_le_bytes());
         }
         let stored = self.word(last)?;
-        Ok(match crc.check() {
+        Ok(match check_of(crc.finalize()) {
             check if check == stored => Check::Whole,
             check if check & stored == check => Check::Cut,
             _ => Check::Damaged,
@@ -258,38 +259,12 @@ impl<'f, F: NorFlash> Sector<'f, F> {
     }
 }
 
-/// CRC-32C of each 4-bit number.
-const NIBBLES: [u32; 16] = {
-    let mut table = [0; 16];
-    let mut at = 0;
-    while at < table.len() {
-        let (mut crc, mut bit) = (at as u32, 0);
-        while bit < 4 {
-            crc = if crc & 1 == 1 { crc >> 1 ^ 0x82F6_3B78 } else { crc >> 1 };
-            bit += 1;
-        }
-        table[at] = crc;
-        at += 1;
-    }
-    table
-};
+/// CRC-32C (Castagnoli).
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
-/// CRC-32C (Castagnoli), word by word.
-struct Crc(u32);
-
-impl Crc {
-    const fn new() -> Self {
-        Self(u32::MAX)
-    }
-
-    fn add(&mut self, word: u32) {
-        self.0 = (0..8).fold(self.0 ^ word, |crc, _| crc >> 4 ^ NIBBLES[(crc & 15) as usize]);
-    }
-
-    /// Never the erased word: an item without a written checksum is incomplete.
-    const fn check(&self) -> u32 {
-        if !self.0 == ERASED { 0 } else { !self.0 }
-    }
+/// Never the erased word: an item without a written checksum is incomplete.
+const fn check_of(crc: u32) -> u32 {
+    if crc == ERASED { 0 } else { crc }
 }
 
 #[cfg(test)]
@@ -311,9 +286,9 @@ mod tests {
 
     #[test]
     fn the_check_is_crc_32c() {
-        let mut crc = Crc::new();
+        let mut crc = CRC.digest();
         // RFC 3720, B.4: 32 bytes of zeros.
-        (0..8).for_each(|_| crc.add(0));
-        assert_eq!(crc.check(), 0x8A91_36AA);
+        (0..8).for_each(|_| crc.update(&[0; WORD]));
+        assert_eq!(check_of(crc.finalize()), 0x8A91_36AA);
     }
 }

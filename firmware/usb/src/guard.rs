@@ -53,12 +53,6 @@ pub struct Link {
     is_configured: AtomicBool,
 }
 
-impl Default for Link {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Link {
     /// Before the host is there.
     pub const fn new() -> Self {

@@ -41,8 +41,8 @@ fn with_two_sessions(mib: u32, seconds: u64) -> Medium {
 fn full() -> Medium {
     let medium = with_two_sessions(40, 20);
     let (status, held) = (CardStatus::new(), Buffers::new());
-    let mounted = Card::mount(medium.clone(), &status, &held);
-    let mut card = mounted.map_err(|(_, error)| error.to_string()).expect("it is in order");
+    let mounted = Card::mount(&medium, &status, &held);
+    let mut card = mounted.map_err(|error| error.to_string()).expect("it is in order");
     let mut segments = (0..).map(|segment| LogName { session: 3, segment });
     for kib in [2 * 1024, 128] {
         while segments.next().is_some_and(|name| card.create(name, kib * 1024).is_ok()) {}
@@ -273,8 +273,8 @@ fn a_checksum_is_of_what_was_recorded_and_nothing_is_lost_while_it_is_computed()
 
 fn places(medium: &Medium, name: LogName) -> (u32, u32) {
     let (status, held) = (CardStatus::new(), Buffers::new());
-    let mounted = Card::mount(medium.clone(), &status, &held);
-    let card = mounted.map_err(|(_, error)| error.to_string()).expect("it is in order");
+    let mounted = Card::mount(medium, &status, &held);
+    let card = mounted.map_err(|error| error.to_string()).expect("it is in order");
     let mut segment = card.segment(name).expect("it is there");
     let mut block = [0; BLOCK_BYTES];
     card.read(&mut segment, 0, &mut block).expect("it reads");

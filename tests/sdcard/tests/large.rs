@@ -109,7 +109,7 @@ fn a_new_segment_on_a_full_large_card_takes_less_than_half_of_what_the_queue_rid
     assert_eq!((lost, found[0].gaps.len()), (0, 0));
     let status = CardStatus::new();
     let buffers = Buffers::new();
-    let card = Card::mount(medium, &status, &buffers).map_err(|(_, error)| error).expect("it mounts");
+    let card = Card::mount(&medium, &status, &buffers).expect("it mounts");
     let mut oldest = LogName { session: LogName::SESSION_MAX, segment: 0 };
     card.logs(|log| oldest = oldest.min(log.name)).expect("it lists");
     assert_eq!(oldest, LogName { session: gone / 4 + 1, segment: gone % 4 });

@@ -36,7 +36,7 @@ pub fn last(medium: &Medium) -> Option<Session> {
 /// Skips `skip`, but not the last one.
 fn some(medium: &Medium, skip: usize) -> Vec<Session> {
     let (status, held) = (CardStatus::new(), Buffers::new());
-    let Ok(card) = Card::mount(medium.clone(), &status, &held) else { return Vec::new() };
+    let Ok(card) = Card::mount(medium, &status, &held) else { return Vec::new() };
     let mut names: BTreeMap<u32, Vec<LogName>> = BTreeMap::new();
     if card.logs(|log| names.entry(log.name.session).or_default().push(log.name)).is_err() {
         return Vec::new();

@@ -149,9 +149,10 @@ fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
         frames.insert(log.name, hashes);
     }
     let (status, held) = (CardStatus::new(), Buffers::new());
-    let mounted = hums_recorder::Card::mount(card.device(Faults::default())?, &status, &held);
+    let device = card.device(Faults::default())?;
+    let mounted = hums_recorder::Card::mount(&device, &status, &held);
     let mut erased = 0;
-    let mounted = mounted.map_err(|(_, error)| anyhow::anyhow!("the card: {error}"))?;
+    let mounted = mounted.map_err(|error| anyhow::anyhow!("the card: {error}"))?;
     mounted.logs(|log| erased += usize::from(log.hidden)).map_err(|error| anyhow::anyhow!("{error}"))?;
     Ok((frames, erased))
 }

@@ -7,7 +7,7 @@ use embassy_futures::select::{Either3, select3};
 use embassy_time::{Duration, Ticker, Timer};
 use hums_core::clock::Span;
 use hums_onboard::monitoring::{Machine, Monitoring, Step, TICK};
-use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
+use hums_onboard::queues::{FramesOut, UplinkOut};
 use hums_onboard::update::UpdateWatch;
 use hums_onboard::{Handover, ResetCause, Task};
 use hums_recorder::CardState;
@@ -38,24 +38,18 @@ const DRAINED_MAX: usize = 64;
 /// That turn.
 const REST: Duration = Duration::from_millis(1);
 
-pub(crate) struct Ends {
-    pub(crate) frames: FramesOut<'static>,
-    pub(crate) uplink: UplinkOut<'static>,
-    pub(crate) sectors: SectorsIn<'static>,
-    pub(crate) gs: GsIn<'static>,
-}
-
 #[embassy_executor::task]
 pub(crate) async fn run(
     body: &'static mut Monitoring<'static>,
-    ends: &'static mut Ends,
+    mut frames: FramesOut<'static>,
+    mut requests: UplinkOut<'static>,
     handover: &'static mut Handover<'static>,
     boot: Boot,
     message: Option<Message>,
     mut led: board::Led,
 ) -> ! {
-    body.start(now(), &mut ends.sectors);
-    tell_fault(body, ends, boot.cause);
+    body.start(now());
+    tell_fault(body, boot.cause);
     let mut told = [false; 6];
     let mut update = UpdateWatch::new(message, boot.cause);
     wake_others();
@@ -67,10 +61,10 @@ pub(crate) async fn run(
         let mut is_behind = false;
         // The tick first: if frames arrive faster than they are processed, they are always due.
         match select3(ticker.next(), links::FRAMES.wait(), links::UPLINK.wait()).await {
-            Either3::Second(()) => is_behind = drain(body, ends),
-            Either3::Third(()) => uplink(body, ends),
+            Either3::Second(()) => is_behind = drain(body, &mut frames),
+            Either3::Third(()) => uplink(body, &mut requests),
             Either3::First(()) => {
-                is_behind = drain(body, ends);
+                is_behind = drain(body, &mut frames);
                 if let Some((cpu_permille, cpu_permille_max)) = load.step(now()) {
                     let (stack_bytes_max, stack_bytes) = memory::stack_used();
                     let (stack_bytes_max, stack_bytes) = (stack_bytes_max as u32, stack_bytes as u32);
@@ -81,14 +75,14 @@ pub(crate) async fn run(
                         stack_bytes,
                     });
                 }
-                tick(body, ends, handover);
+                tick(body, handover);
                 if body.wants_card_reader(now()) {
-                    leave(body, ends, handover, card_reader::restart).await;
+                    leave(body, handover, card_reader::restart).await;
                 }
-                if watch_update(body, ends, &mut update) {
-                    leave(body, ends, handover, || crate::update::restart(Message::Install)).await;
+                if watch_update(body, &mut update) {
+                    leave(body, handover, || crate::update::restart(Message::Install)).await;
                 }
-                tell_board(body, ends, &mut told, boot.entropy.is_some());
+                tell_board(body, &mut told, boot.entropy.is_some());
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks, update.is_refused()));
                 fault::tick(now());
@@ -112,13 +106,8 @@ pub(crate) async fn run(
 
 /// Ends the log, saves what the store keeps, and restarts with `restart`. A card that does not take the end in time is left
 /// as at a power cut.
-async fn leave(
-    body: &mut Monitoring<'static>,
-    ends: &mut Ends,
-    handover: &mut Handover<'static>,
-    restart: fn() -> !,
-) -> ! {
-    finish(body, ends);
+async fn leave(body: &mut Monitoring<'static>, handover: &mut Handover<'static>, restart: fn() -> !) -> ! {
+    finish(body);
     let end = now() + END_MAX;
     while now() < end {
         let is_saved = save(body, handover);
@@ -134,8 +123,8 @@ async fn leave(
 }
 
 #[inline(never)]
-fn finish(body: &mut Monitoring<'static>, ends: &mut Ends) {
-    body.finish(now(), &mut ends.sectors, &ends.gs);
+fn finish(body: &mut Monitoring<'static>) {
+    body.finish(now());
     LOG_ENDS.store(true, Ordering::Release);
 }
 
@@ -149,17 +138,17 @@ fn save(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) -> boo
 /// The previous start's end, for record and ground station.
 // Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
-fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause) {
+fn tell_fault(body: &mut Monitoring<'static>, cause: ResetCause) {
     let noted = fault::take();
     fault::begin(false);
     let unnoted = noted.is_none() && cause == ResetCause::Watchdog;
     if let Some(fault) = noted.or_else(|| unnoted.then(Fault::without_note)) {
-        body.fault(now(), &fault.record(), fault.last_messages(), &mut ends.sectors);
+        body.fault(now(), &fault.record(), fault.last_messages());
     }
 }
 
 #[inline(never)]
-fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool; 6], has_random: bool) {
+fn tell_board(body: &mut Monitoring<'static>, told: &mut [bool; 6], has_random: bool) {
     let stood_still = |port: &AtomicBool| port.load(Ordering::Relaxed);
     let faults = [
         (board::chip_is_wrong(), 2, "HUMS: wrong chip, it needs an STM32F405"),
@@ -175,7 +164,7 @@ fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool;
     ];
     for ((is_so, severity, text), told) in faults.into_iter().zip(told) {
         if is_so && !core::mem::replace(told, true) {
-            body.note(now(), severity, text, &mut ends.sectors);
+            body.note(now(), severity, text);
         }
     }
 }
@@ -183,8 +172,7 @@ fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool;
 // Own stack frame (ARCHITECTURE.md, Memory). As all that follow.
 
 #[inline(never)]
-fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) -> bool {
-    let Ends { frames, sectors, gs, .. } = ends;
+fn drain(body: &mut Monitoring<'static>, frames: &mut FramesOut<'static>) -> bool {
     let mut begin = |step| {
         costs::enter(match step {
             Step::Encode { at, id } => {
@@ -195,32 +183,30 @@ fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) -> bool {
             Step::Summary => Stage::Summary,
         });
     };
-    let mut drain = || measure(Stage::Monitor, || body.drain_in_steps(frames, sectors, gs, &mut begin));
+    let mut drain = || measure(Stage::Monitor, || body.drain_in_steps(frames, &mut begin));
     (0..DRAINED_MAX).all(|_| drain())
 }
 
 #[inline(never)]
-fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
-    let Ends { uplink, sectors, gs, .. } = ends;
-    while measure(Stage::Monitor, || body.uplink(now(), uplink, sectors, gs)) {}
+fn uplink(body: &mut Monitoring<'static>, uplink: &mut UplinkOut<'static>) {
+    while measure(Stage::Monitor, || body.uplink(now(), uplink)) {}
 }
 
 #[inline(never)]
-fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
+fn note(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) {
     while let Some(news) = handover.news() {
         log!(info, "{=str}", news.text);
-        body.note(now(), news.severity, news.text, &mut ends.sectors);
+        body.note(now(), news.severity, news.text);
     }
 }
 
 #[inline(never)]
-fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
+fn tick(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) {
     let (gs, autopilot) = body.bauds();
     BAUD_GS.store(gs, Ordering::Relaxed);
     BAUD_AUTOPILOT.store(autopilot, Ordering::Relaxed);
-    let Ends { sectors, gs, .. } = ends;
     measure(Stage::Tick, || {
-        body.tick(now(), sectors, gs, &mut |finding| {
+        body.tick(now(), &mut |finding| {
             log!(
                 info,
                 "{=str} {=str} {=str} {=f32} {=str}",
@@ -233,18 +219,18 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
         });
         hand_over(body, handover);
     });
-    note(body, ends, handover);
+    note(body, handover);
 }
 
 #[inline(never)]
-fn watch_update(body: &mut Monitoring<'static>, ends: &mut Ends, update: &mut UpdateWatch) -> bool {
+fn watch_update(body: &mut Monitoring<'static>, update: &mut UpdateWatch) -> bool {
     if let Some((severity, text)) = update.news(&UPDATE_STATUS) {
-        body.note(now(), severity, text, &mut ends.sectors);
+        body.note(now(), severity, text);
     }
-    let (calm, frames) = (STORE_STATUS.calm(), PORT_STATUS.read().frames);
+    let (calm, frames) = (STORE_STATUS.read().calm, PORT_STATUS.read().frames);
     let is_due = update.is_due(now(), &UPDATE_STATUS, calm, frames, crate::update::is_on_trial());
     if is_due {
-        body.note(now(), 5, "HUMS: update begins, nothing is recorded", &mut ends.sectors);
+        body.note(now(), 5, "HUMS: update begins, nothing is recorded");
     }
     is_due
 }

@@ -19,7 +19,10 @@ pub(crate) async fn run(mut port: board::PortRx, mut frames: FramesIn<'static>) 
             Ok(Ok(count)) => {
                 measure(Stage::Framer, || body.received(now(), count, &mut frames));
             }
-            Ok(Err(overrun)) => PORT_STATUS.count_overrun(overrun.blind_ms),
+            Ok(Err(overrun)) => PORT_STATUS.change(|port| {
+                port.overrun += 1;
+                port.blind_ms += u64::from(overrun.blind_ms);
+            }),
             Err(_silence) => body.idle(now(), &mut frames),
         }
         links::FRAMES.signal(());

@@ -7,10 +7,10 @@ use embassy_time::{Duration, Timer, with_timeout};
 use hums_core::clock::Instant;
 use hums_onboard::queues::SectorsOut;
 use hums_onboard::shelf::Server;
-use hums_onboard::storage::NO_CARD_RETRY;
+use hums_onboard::storage::{self, NO_CARD_RETRY};
 use hums_onboard::update::{RunningImage, UpdateSearch};
-use hums_onboard::{Service, Storage, StoreWriter, Task};
-use hums_recorder::Buffers;
+use hums_onboard::{Service, StoreWriter, Task};
+use hums_recorder::{Buffers, Recorder};
 use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::status::{CARD_STATUS, LOG_ENDED, LOG_ENDS, SUPERVISOR, UPDATE_STATUS};
@@ -24,11 +24,10 @@ const REPORT: Duration = Duration::from_secs(1);
 
 const END_LOOK: Duration = Duration::from_millis(10);
 
-type Recording = Storage<'static, board::Card>;
 type Saving = &'static mut StoreWriter<'static, board::StoreFlash>;
 
 pub(crate) struct Body {
-    storage: Recording,
+    recorder: Recorder<'static, board::Card>,
     sectors: SectorsOut<'static>,
     shelf: Server<'static>,
     store_writer: Saving,
@@ -36,7 +35,7 @@ pub(crate) struct Body {
     search: UpdateSearch,
 }
 
-// SAFETY: `BUFFERS`, the only part that may not be shared, is lent to the one body. The others are `Send` (below).
+// SAFETY: `BUFFERS` and `CARD`, the only parts that may not be shared, are lent to the one body. The others are `Send` (below).
 unsafe impl Send for Body {}
 
 const fn is_send<T: Send>() {}
@@ -48,6 +47,7 @@ const _: () = {
 };
 
 pub(crate) static BUFFERS: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
+static CARD: StaticCell<board::Card> = StaticCell::new();
 // In a static of its own: a task's arguments take their room twice.
 static BODY: StaticCell<Body> = StaticCell::new();
 
@@ -60,9 +60,9 @@ pub(crate) fn body(
     store_writer: Saving,
 ) -> &'static mut Body {
     BODY.init_with(|| {
-        let storage = Storage::new(card, &CARD_STATUS, BUFFERS.take(), entropy);
+        let recorder = Recorder::new(CARD.init(card), &CARD_STATUS, BUFFERS.take(), entropy);
         let (running, search) = (update::running(), UpdateSearch::new());
-        Body { storage, sectors, shelf, store_writer, running, search }
+        Body { recorder, sectors, shelf, store_writer, running, search }
     })
 }
 
@@ -90,7 +90,8 @@ pub(crate) async fn run(body: &'static mut Body) -> ! {
 
 #[inline(never)]
 fn end(body: &mut Body) -> bool {
-    let has_ended = LOG_ENDED.load(Ordering::Relaxed) || body.storage.finish_after(&body.sectors);
+    let has_ended =
+        LOG_ENDED.load(Ordering::Relaxed) || storage::finish_after(&mut body.recorder, &body.sectors);
     LOG_ENDED.store(has_ended, Ordering::Relaxed);
     has_ended
 }
@@ -109,12 +110,12 @@ async fn wait_for_work(body: &mut Body) {
 
 #[inline(never)]
 fn service(body: &mut Body, begun: Instant) -> Service {
-    measure(Stage::Storage, || body.storage.service(begun, &mut body.sectors))
+    measure(Stage::Storage, || storage::service(&mut body.recorder, begun, &mut body.sectors))
 }
 
 #[inline(never)]
 fn serve(body: &mut Body) -> bool {
-    measure(Stage::Storage, || body.storage.serve(&mut body.shelf))
+    measure(Stage::Storage, || body.shelf.serve(&mut body.recorder))
 }
 
 #[inline(never)]
@@ -127,7 +128,7 @@ fn look_for_update(body: &mut Body, service: Service) {
     if service == Service::Wrote {
         return;
     }
-    body.search.look(body.storage.recorder(), &body.running, &UPDATE_STATUS);
+    body.search.look(&mut body.recorder, &body.running, &UPDATE_STATUS);
     if update::is_on_trial() && body.search.is_proved(now(), &CARD_STATUS) {
         update::confirm(&body.running);
     }

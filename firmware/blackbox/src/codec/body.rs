@@ -2,6 +2,8 @@
 
 use core::ops::Range;
 
+use zerocopy::FromZeros;
+
 use super::element::{Context, Distributions, ELEMENTS, Element, ElementKind, Elements};
 use super::frame::Frame;
 use super::links::Registers;
@@ -9,14 +11,17 @@ use super::recall::End;
 use super::slots::{Length, Slot};
 use super::texts::Texts;
 use crate::coder::Coder;
+use crate::zeros;
 
 const AT: u32 = 0x100;
 
+#[derive(FromZeros)]
 pub(super) struct Body {
     pub(super) elements: Elements,
     pub(super) common: Common,
 }
 
+#[derive(FromZeros)]
 pub(super) struct Common {
     pub(super) distributions: Distributions,
     pub(super) texts: Texts,
@@ -26,24 +31,11 @@ pub(super) struct Common {
 }
 
 impl Body {
-    pub(super) const fn new() -> Self {
-        Self {
-            elements: Elements::new(),
-            common: Common {
-                distributions: Distributions::new(),
-                texts: Texts::new(),
-                registers: Registers::new(),
-                clock_us: 0,
-                clock_ms: 0,
-            },
-        }
-    }
-
     pub(super) fn reset(&mut self) {
         self.elements.reset();
         self.common.distributions.reset();
         self.common.texts.reset();
-        self.common.registers = Registers::new();
+        self.common.registers.zero();
         (self.common.clock_us, self.common.clock_ms) = (0, 0);
     }
 
@@ -134,7 +126,7 @@ impl Body {
     }
 
     pub(super) fn is_repeat(&self, slot: &Slot, frame: &Frame) -> bool {
-        let mut copy = Frame::empty();
+        let mut copy: Frame = zeros();
         copy.len = frame.len;
         self.restore(slot, &mut copy).is_some() && copy.payload == frame.payload
     }

@@ -12,6 +12,7 @@ use crate::limits::ENTRY_BYTES_MAX;
 const _: () = assert!(PAYLOAD_BYTES_MAX == 0xff);
 
 /// A frame's parts.
+#[derive(zerocopy::FromZeros)]
 pub(crate) struct Frame {
     pub(crate) v2: bool,
     pub(crate) incompat: u8,
@@ -30,23 +31,6 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    pub(crate) const fn empty() -> Self {
-        Self {
-            v2: false,
-            incompat: 0,
-            compat: 0,
-            sequence: 0,
-            system: 0,
-            component: 0,
-            id: 0,
-            len: 0,
-            payload: [0; PAYLOAD_BYTES_MAX + 9],
-            checksum: 0,
-            signature: [0; SIGNATURE_BYTES],
-            used: 0,
-        }
-    }
-
     /// The payload from here (below 256) on: room for the widest element.
     #[inline]
     pub(crate) fn place(&mut self, offset: usize) -> &mut [u8; 8] {
@@ -192,7 +176,7 @@ mod tests {
     #[test]
     fn frames_come_apart_and_together() {
         let heartbeat = [0xfe, 9, 0x4e, 1, 1, 0, 0, 0, 0, 0, 2, 3, 0x51, 4, 3, 0x1c, 0x7f];
-        let mut frame = Frame::empty();
+        let mut frame: Frame = crate::zeros();
         frame.parse(&heartbeat).expect("a frame");
         assert_eq!(crc::step(frame.checksum_before_seed(), 50), frame.checksum);
         assert_eq!(crc::extra_of(frame.checksum_before_seed(), frame.checksum), Some(50));

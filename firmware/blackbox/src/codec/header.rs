@@ -18,6 +18,7 @@ const UNEXPECTED: Cdf = Cdf::from_sizes([4, 8, 80, 20, 1, 1, 1, 1, 1, 1, 1, 1, 1
 const SYMBOL: Cdf = Cdf::from_sizes([80, 4, 8, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
 
 /// Statistics of headers.
+#[derive(zerocopy::FromZeros)]
 pub(super) struct Headers {
     last: u8,
     first: Cdf,
@@ -34,16 +35,6 @@ pub(super) struct Plan {
 }
 
 impl Headers {
-    pub(super) const fn new() -> Self {
-        Self {
-            last: 0,
-            first: Cdf::UNSET,
-            symbols: [Cdf::UNSET; 16],
-            jumps: [Cdf::UNSET; 2],
-            signatures: Cdf::UNSET,
-        }
-    }
-
     pub(super) fn reset(&mut self) {
         self.last = 0;
         self.first = SYMBOL;

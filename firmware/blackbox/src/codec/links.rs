@@ -7,6 +7,7 @@
 
 use super::element::Element;
 use hums_dialect::ids::ATTITUDE_QUATERNION;
+use zerocopy::FromZeros;
 
 /// Stored quantities: single-precision numbers, and from `WHOLE` on whole ones of 32 bits, without a scale.
 const REGISTERS: usize = 45;
@@ -168,13 +169,10 @@ pub(super) fn row_of(id: u32, offset: usize) -> u8 {
     found.map_or(0, |index| index as u8 + 1)
 }
 
+#[derive(FromZeros)]
 pub(super) struct Registers([u32; REGISTERS]);
 
 impl Registers {
-    pub(super) const fn new() -> Self {
-        Self([0; REGISTERS])
-    }
-
     fn get(&self, register: usize) -> f32 {
         self.0.get(register).map_or(0.0, |&bits| f32::from_bits(bits))
     }

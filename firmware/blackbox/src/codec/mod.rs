@@ -24,6 +24,8 @@ use records::Records;
 pub(crate) use slots::SLOTS;
 use slots::{INSTANCE_BYTES, Key, Length, NextEntry, Slots};
 
+use zerocopy::FromZeros;
+
 use crate::coder::{Coder, Encoder, Scratch, SymbolReader, SymbolWriter};
 use crate::distribution::Cdf;
 use crate::layouts::Layouts;
@@ -59,7 +61,8 @@ pub(crate) struct Corrupt;
 
 pub(crate) type Out = Scratch<CODED_BYTES_MAX>;
 
-/// Common to writer and reader, about the group so far.
+/// Common to writer and reader, about the group so far. Zeros until the first [`Self::reset`].
+#[derive(FromZeros)]
 pub(crate) struct Model {
     layouts: Layouts,
     last_ms: u64,
@@ -73,19 +76,6 @@ pub(crate) struct Model {
 const TIME: Cdf = Cdf::from_sizes([40, 10, 6, 4, 4, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 1]);
 
 impl Model {
-    /// The board needs no image of it in flash: good from the first [`Self::reset`] on.
-    pub(crate) const fn new() -> Self {
-        Self {
-            layouts: Layouts::Current,
-            last_ms: 0,
-            slots: Slots::new(),
-            headers: Headers::new(),
-            body: Body::new(),
-            records: Records::new(),
-            times: Cdf::UNSET,
-        }
-    }
-
     pub(crate) fn reset(&mut self, at_ms: u64, layouts: Layouts) {
         self.layouts = layouts;
         self.last_ms = at_ms;

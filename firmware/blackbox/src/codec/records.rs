@@ -21,6 +21,7 @@ const CONTEXTS: usize = 16;
 const RAW: usize = 0;
 const OTHER_KIND: usize = 15;
 
+#[derive(zerocopy::FromZeros)]
 pub(super) struct Records {
     kinds: Cdf,
     kept: [[u32; KEPT]; KINDS],
@@ -30,15 +31,6 @@ pub(super) struct Records {
 }
 
 impl Records {
-    pub(super) const fn new() -> Self {
-        Self {
-            kinds: Cdf::UNSET,
-            kept: [[0; KEPT]; KINDS],
-            words: [Cdf::UNSET; CONTEXTS],
-            halves: [Cdf::UNSET; 4],
-        }
-    }
-
     /// In place: a new one would go through the stack.
     pub(super) fn reset(&mut self) {
         self.kinds = Cdf::FLAT;

@@ -1,10 +1,13 @@
 //! Slots: each stream of one message from one sender (and one instance, for messages with several). A slot stores the
 //! shape of its last frame, and the order of slots.
 
+use zerocopy::FromZeros;
+
 use super::frame::Frame;
 use crate::coder::Coder;
 use crate::distribution::{Cdf, Cell};
 use crate::layouts::{Layout, LayoutIndex};
+use crate::zeros;
 
 /// Slots at most. Further streams are coded as plain bytes.
 pub(crate) const SLOTS: usize = 112;
@@ -14,7 +17,7 @@ pub(crate) const SENDERS: usize = 16;
 /// A name of 10 characters.
 pub(crate) const INSTANCE_BYTES: usize = 10;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromZeros)]
 pub(crate) struct Key {
     pub(crate) id: u32,
     pub(crate) v2: bool,
@@ -22,7 +25,8 @@ pub(crate) struct Key {
     pub(crate) instance: [u8; INSTANCE_BYTES],
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromZeros)]
+#[repr(u8)]
 pub(crate) enum Length {
     /// Without the zeros at the end.
     Trimmed,
@@ -30,7 +34,7 @@ pub(crate) enum Length {
     Fixed(u8),
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, FromZeros)]
 pub(crate) struct Slot {
     pub(crate) key: Key,
     pub(crate) layout: Option<LayoutIndex>,
@@ -63,30 +67,6 @@ pub(crate) struct Slot {
 pub(crate) const NONE: u8 = u8::MAX;
 
 impl Slot {
-    /// All zeros: a place that no message has claimed.
-    const UNSET: Self = Self {
-        key: Key { id: 0, v2: false, sender: 0, instance: [0; INSTANCE_BYTES] },
-        layout: None,
-        elements: 0,
-        elements_count: 0,
-        times: 0,
-        at_ms: 0,
-        seed: 0,
-        own_seed: false,
-        verified: false,
-        incompat: 0,
-        compat: 0,
-        length: Length::Trimmed,
-        described: 0,
-        header: 0,
-        instance_at: 0,
-        instance_size: 0,
-        calm: Cell::UNSET,
-        quiet: false,
-        frames: 0,
-        next: [0; 2],
-    };
-
     pub(crate) fn new(
         key: Key,
         place: Option<LayoutIndex>,
@@ -106,7 +86,7 @@ impl Slot {
             length: if key.v2 && layout.is_some() { Length::Trimmed } else { Length::Fixed(len_base as u8) },
             calm: Cell::EVEN,
             next: [NONE; 2],
-            ..Self::UNSET
+            ..zeros()
         }
     }
 }
@@ -119,7 +99,7 @@ impl Slot {
 }
 
 /// A sender's state.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, FromZeros)]
 pub(crate) struct Sender {
     pub(crate) system: u8,
     pub(crate) component: u8,
@@ -152,16 +132,15 @@ const KINDS: usize = 32;
 const ORDER_3: usize = 512;
 const ORDER_2: usize = 256;
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, FromZeros)]
 struct Guess {
     slot: u8,
     sure: u8,
 }
 
-/// All zeros, as before the first reset.
-const UNSET: Guess = Guess { slot: 0, sure: 0 };
 const NO_GUESS: Guess = Guess { slot: NONE, sure: 0 };
 
+#[derive(FromZeros)]
 pub(crate) struct Slots {
     pub(crate) list: [Slot; SLOTS],
     used: u8,
@@ -179,24 +158,6 @@ pub(crate) struct Slots {
 }
 
 impl Slots {
-    pub(crate) const fn new() -> Self {
-        Self {
-            list: [Slot::UNSET; SLOTS],
-            used: 0,
-            senders: [Sender { system: 0, component: 0, sequence: 0, signature_link: 0, signature_time: 0 };
-                SENDERS],
-            senders_used: 0,
-            order_3: [UNSET; ORDER_3],
-            order_2: [UNSET; ORDER_2],
-            past: [0; 3],
-            places: (0, 0),
-            guesses: (0, 0, 0),
-            kind: [Cdf::UNSET; KINDS],
-            high: Cdf::UNSET,
-            low: [Cdf::UNSET; SLOTS / 16],
-        }
-    }
-
     pub(crate) fn reset(&mut self) {
         self.used = 0;
         self.senders_used = 0;

@@ -9,16 +9,13 @@ const ROWS: usize = 64;
 
 const MATCHES: usize = 8;
 
+#[derive(zerocopy::FromZeros)]
 pub(crate) struct TextModel {
     rows: [Cdf; ROWS],
     same: [Cell; MATCHES],
 }
 
 impl TextModel {
-    pub(crate) const fn new() -> Self {
-        Self { rows: [Cdf::UNSET; ROWS], same: [Cell::UNSET; MATCHES] }
-    }
-
     /// In place: a new one would go through the stack.
     pub(crate) fn reset(&mut self) {
         self.rows.fill(Cdf::FLAT);

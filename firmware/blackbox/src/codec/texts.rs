@@ -11,6 +11,7 @@ const TEXT_BYTES_MAX: usize = 255;
 
 const NOT_KEPT: u32 = u32::MAX;
 
+#[derive(zerocopy::FromZeros)]
 pub(super) struct Texts {
     pub(super) model: TextModel,
     kept: [u8; TEXT_BYTES],
@@ -20,16 +21,6 @@ pub(super) struct Texts {
 }
 
 impl Texts {
-    pub(super) const fn new() -> Self {
-        Self {
-            model: TextModel::new(),
-            kept: [0; TEXT_BYTES],
-            used: 0,
-            changes: Cdf::UNSET,
-            lengths: [Cdf::UNSET; 2],
-        }
-    }
-
     pub(super) fn reset(&mut self) {
         self.model.reset();
         self.used = 0;

@@ -2,89 +2,46 @@
 
 use hums_core::clock::Instant;
 
-use super::stored::{Fields, Sink};
+use super::stored::{Field, Fields, Sink, numbered, record};
 
-/// The kind of a loss. The numbers are stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[repr(u8)]
-pub enum LossKind {
-    /// Bytes lost because the receive buffer overflowed.
-    #[default]
-    UartOverrun = 0,
-    /// Bytes outside frames.
-    NotFrames = 1,
-    /// Frames that were cut or damaged.
-    DamagedFrames = 2,
-    /// Frames for which the queue had no room.
-    QueueFull = 3,
-    /// Sectors that could not be written.
-    Card = 4,
-    /// Records for which there was no room.
-    Records = 5,
-    /// Frames of a recording that was packed whose checksum did not fit.
-    WrongChecksums = 6,
-    /// Damaged places of a recording that was packed.
-    DamagedPlaces = 7,
-    /// A cause that this reader does not know.
-    Other = 255,
+numbered! {
+    /// The kind of a loss. The numbers are stored.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    LossKind {
+        /// Bytes lost because the receive buffer overflowed.
+        #[default]
+        UartOverrun = 0 "uart_overrun",
+        /// Bytes outside frames.
+        NotFrames = 1 "bytes_not_frames",
+        /// Frames that were cut or damaged.
+        DamagedFrames = 2 "damaged_frames",
+        /// Frames for which the queue had no room.
+        QueueFull = 3 "queue_full",
+        /// Sectors that could not be written.
+        Card = 4 "card",
+        /// Records for which there was no room.
+        Records = 5 "records",
+        /// Frames of a recording that was packed whose checksum did not fit.
+        WrongChecksums = 6 "wrong_checksums",
+        /// Damaged places of a recording that was packed.
+        DamagedPlaces = 7 "damaged_places",
+        /// A cause that this reader does not know.
+        Other = 255 "other",
+    } else Other
 }
 
-impl LossKind {
-    /// The name that reports use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::UartOverrun => "uart_overrun",
-            Self::NotFrames => "bytes_not_frames",
-            Self::DamagedFrames => "damaged_frames",
-            Self::QueueFull => "queue_full",
-            Self::Card => "card",
-            Self::Records => "records",
-            Self::WrongChecksums => "wrong_checksums",
-            Self::DamagedPlaces => "damaged_places",
-            Self::Other => "other",
-        }
-    }
-
-    const fn from_number(number: u8) -> Self {
-        match number {
-            0 => Self::UartOverrun,
-            1 => Self::NotFrames,
-            2 => Self::DamagedFrames,
-            3 => Self::QueueFull,
-            4 => Self::Card,
-            5 => Self::Records,
-            6 => Self::WrongChecksums,
-            7 => Self::DamagedPlaces,
-            _ => Self::Other,
-        }
-    }
-}
-
-/// Something was lost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Loss {
-    /// Kind and cause.
-    pub what: LossKind,
-    /// Bytes, frames, sectors or records.
-    pub count: u64,
-    /// The first one.
-    pub from: Instant,
-    /// The last one.
-    pub to: Instant,
-}
-
-impl Loss {
-    pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(7).time(self.from).time(self.to).u64(self.count).u8(self.what as u8);
-    }
-
-    pub(super) fn read(fields: &mut Fields<'_>) -> Self {
-        Self {
-            what: LossKind::from_number(fields.u8()),
-            from: fields.instant(),
-            to: fields.instant(),
-            count: fields.u64(),
-        }
+record! {
+    /// Something was lost.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    Loss {
+        /// Kind and cause.
+        what: LossKind,
+        /// The first one.
+        from: Instant,
+        /// The last one.
+        to: Instant,
+        /// Bytes, frames, sectors or records.
+        count: u64,
     }
 }
 
@@ -100,10 +57,9 @@ macro_rules! statistics {
             $($(#[$doc])+ pub $name: u64,)+
         }
 
-        impl Stats {
-            pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        impl<'a> Field<'a> for Stats {
+            fn numbers(&self, sink: &mut Sink<'_>) {
                 let numbers = [$(self.$name),+];
-                sink.head(8);
                 // Missing bytes read as zeros.
                 let stored = numbers.iter().rposition(|&number| number != 0).map_or(0, |last| last + 1);
                 for &number in numbers.iter().take(stored.max(STATS_MIN)) {
@@ -111,8 +67,8 @@ macro_rules! statistics {
                 }
             }
 
-            pub(super) fn read(fields: &mut Fields<'_>) -> Self {
-                Self { $($name: fields.u64(),)+ }
+            fn read(fields: &mut Fields<'a>) -> Option<Self> {
+                Some(Self { $($name: fields.u64(),)+ })
             }
         }
     };

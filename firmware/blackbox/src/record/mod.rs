@@ -29,7 +29,7 @@ pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage
 pub use vehicle::{Clock, Parameter, Vehicle};
 pub use wear::{Component, Exceedance, RecordReason};
 
-use stored::{Fields, Sink};
+use stored::{Field, Fields, Sink};
 pub(crate) use stored::{HEAD_BYTES, Shape};
 
 // The longest records: a boot and a fault.
@@ -37,55 +37,88 @@ const _: () = assert!(HEAD_BYTES + 7 * 4 + 4 * (1 + NAME_BYTES_MAX) + 13 <= RECO
 const _: () =
     assert!(HEAD_BYTES + 12 * 4 + 1 + 2 * (1 + NAME_BYTES_MAX) + 1 + TEXT_BYTES_MAX <= RECORD_BYTES_MAX);
 
-/// One record; numbers of kinds never change meaning.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Record<'a> {
-    /// Kind 1: the monitor started.
-    Boot(Boot<'a>),
-    /// Kind 2: the recorded vehicle, as far as known.
-    Vehicle(Vehicle),
-    /// Kind 3: a parameter's value.
-    Parameter(Parameter<'a>),
-    /// Kind 4: the two clocks at one moment; the reader back-dates the session with it.
-    Clock(Clock),
-    /// Kind 5: a check changed its level.
-    Finding(FindingRecord<'a>),
-    /// Kind 6: usage counters.
-    Usage(Usage<'a>),
-    /// Kind 7: something was lost.
-    Loss(Loss),
-    /// Kind 8: the recorder's statistics so far.
-    Stats(Stats),
-    /// Kind 9: how the last boot ended.
-    Fault(Fault<'a>),
-    /// Kind 10: a mark in time, for instance a moment to look at later.
-    Event(Event<'a>),
-    /// Kind 11: free text.
-    Note(Note<'a>),
-    /// Kind 12: the airframe's life.
-    Lifetime(Lifetime<'a>),
-    /// Kind 13: limits of one check that were crossed.
-    Exceedance(Exceedance<'a>),
-    /// Kind 14: a part that wears.
-    Component(Component<'a>),
-    /// Kind 15: the stored part of the session.
-    Keep(Keep),
-    /// Kind 16: half of a snapshot around a critical finding.
-    Snapshot(Snapshot<'a>),
-    /// Kind 17: a step of the protective action.
-    Protection(Protection),
-    /// Kind 18: the log is whole up to here.
-    Mark(Mark),
-    /// Unknown to this reader.
-    Unknown {
-        /// The stored kind.
-        kind: u8,
-        /// The stored version.
-        version: u8,
-        /// The rest of the head, numbers, bytes.
-        bytes: &'a [u8],
-    },
+macro_rules! records {
+    ($($(#[$doc:meta])+ $kind:literal $name:ident($type:ty),)+) => {
+        /// One record; numbers of kinds never change meaning.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[non_exhaustive]
+        pub enum Record<'a> {
+            $($(#[$doc])+ $name($type),)+
+            /// Unknown to this reader.
+            Unknown {
+                /// The stored kind.
+                kind: u8,
+                /// The stored version.
+                version: u8,
+                /// The rest of the head, numbers, bytes.
+                bytes: &'a [u8],
+            },
+        }
+
+        impl<'a> Record<'a> {
+            /// Returns its length.
+            pub fn store(&self, out: &mut [u8; RECORD_BYTES_MAX]) -> Result<usize, TooLong> {
+                let mut sink = Sink::new(out);
+                match self {
+                    $(Self::$name(record) => sink.record($kind, record),)+
+                    Self::Unknown { kind, version, bytes } => {
+                        sink.bytes(&[*kind, *version]).bytes(bytes);
+                    }
+                }
+                sink.len().ok_or(TooLong)
+            }
+
+            /// Missing bytes read as zeros and empty texts; an unknown record is `Unknown`.
+            pub fn read(stored: &'a [u8]) -> Self {
+                let (Shape { kind, version, .. }, mut fields) = Fields::new(stored);
+                let known = match kind {
+                    $($kind => Field::read(&mut fields).map(Self::$name),)+
+                    _ => None,
+                };
+                let bytes = stored.get(2..).unwrap_or_default();
+                known.unwrap_or(Self::Unknown { kind, version, bytes })
+            }
+        }
+    };
+}
+
+records! {
+    /// The monitor started.
+    1 Boot(Boot<'a>),
+    /// The recorded vehicle, as far as known.
+    2 Vehicle(Vehicle),
+    /// A parameter's value.
+    3 Parameter(Parameter<'a>),
+    /// The two clocks at one moment; the reader back-dates the session with it.
+    4 Clock(Clock),
+    /// A check changed its level.
+    5 Finding(FindingRecord<'a>),
+    /// Usage counters.
+    6 Usage(Usage<'a>),
+    /// Something was lost.
+    7 Loss(Loss),
+    /// The recorder's statistics so far.
+    8 Stats(Stats),
+    /// How the last boot ended.
+    9 Fault(Fault<'a>),
+    /// A mark in time, for instance a moment to look at later.
+    10 Event(Event<'a>),
+    /// Free text.
+    11 Note(Note<'a>),
+    /// The airframe's life.
+    12 Lifetime(Lifetime<'a>),
+    /// Limits of one check that were crossed.
+    13 Exceedance(Exceedance<'a>),
+    /// A part that wears.
+    14 Component(Component<'a>),
+    /// The stored part of the session.
+    15 Keep(Keep),
+    /// Half of a snapshot around a critical finding.
+    16 Snapshot(Snapshot<'a>),
+    /// A step of the protective action.
+    17 Protection(Protection),
+    /// The log is whole up to here.
+    18 Mark(Mark),
 }
 
 /// The record is longer than `RECORD_BYTES_MAX`.
@@ -99,65 +132,6 @@ impl fmt::Display for TooLong {
 }
 
 impl core::error::Error for TooLong {}
-
-impl<'a> Record<'a> {
-    /// Returns its length.
-    pub fn store(&self, out: &mut [u8; RECORD_BYTES_MAX]) -> Result<usize, TooLong> {
-        let mut sink = Sink::new(out);
-        match self {
-            Self::Boot(boot) => boot.store(&mut sink),
-            Self::Vehicle(vehicle) => vehicle.store(&mut sink),
-            Self::Parameter(parameter) => parameter.store(&mut sink),
-            Self::Clock(clock) => clock.store(&mut sink),
-            Self::Finding(finding) => finding.store(&mut sink),
-            Self::Usage(usage) => usage.store(&mut sink),
-            Self::Loss(loss) => loss.store(&mut sink),
-            Self::Stats(stats) => stats.store(&mut sink),
-            Self::Fault(fault) => fault.store(&mut sink),
-            Self::Event(event) => event.store(&mut sink),
-            Self::Note(note) => note.store(&mut sink),
-            Self::Lifetime(lifetime) => lifetime.store(&mut sink),
-            Self::Exceedance(exceedance) => exceedance.store(&mut sink),
-            Self::Component(component) => component.store(&mut sink),
-            Self::Keep(keep) => keep.store(&mut sink),
-            Self::Snapshot(snapshot) => snapshot.store(&mut sink),
-            Self::Protection(protection) => protection.store(&mut sink),
-            Self::Mark(mark) => mark.store(&mut sink),
-            Self::Unknown { kind, version, bytes } => {
-                sink.bytes(&[*kind, *version]).bytes(bytes);
-            }
-        }
-        sink.len().ok_or(TooLong)
-    }
-
-    /// Missing bytes read as zeros and empty texts; an unknown record is `Unknown`.
-    pub fn read(stored: &'a [u8]) -> Self {
-        let (Shape { kind, version, .. }, mut fields) = Fields::new(stored);
-        let fields = &mut fields;
-        let unknown = Self::Unknown { kind, version, bytes: stored.get(2..).unwrap_or_default() };
-        match kind {
-            1 => Self::Boot(Boot::read(fields)),
-            2 => Self::Vehicle(Vehicle::read(fields)),
-            3 => Self::Parameter(Parameter::read(fields)),
-            4 => Self::Clock(Clock::read(fields)),
-            5 => FindingRecord::read(fields).map_or(unknown, Self::Finding),
-            6 => Self::Usage(Usage::read(fields)),
-            7 => Self::Loss(Loss::read(fields)),
-            8 => Self::Stats(Stats::read(fields)),
-            9 => Self::Fault(Fault::read(fields)),
-            10 => Self::Event(Event::read(fields)),
-            11 => Self::Note(Note::read(fields)),
-            12 => Self::Lifetime(Lifetime::read(fields)),
-            13 => Self::Exceedance(Exceedance::read(fields)),
-            14 => Self::Component(Component::read(fields)),
-            15 => Self::Keep(Keep::read(fields)),
-            16 => Snapshot::read(fields).map_or(unknown, Self::Snapshot),
-            17 => Protection::read(fields).map_or(unknown, Self::Protection),
-            18 => Mark::read(fields).map_or(unknown, Self::Mark),
-            _ => unknown,
-        }
-    }
-}
 
 #[cfg(test)]
 mod tests {

@@ -6,7 +6,7 @@ use hums_core::health::Subsystem;
 use hums_core::protect::{Action, Stage};
 use hums_core::snapshot::{COLUMNS_MAX, INTERVAL, SAMPLES, columns};
 
-use super::stored::{Fields, Sink};
+use super::stored::{Field, Fields, Sink, record};
 use crate::limits::RECORD_BYTES_MAX;
 
 const VALUES_MAX: usize = 2 * COLUMNS_MAX * SAMPLES;
@@ -75,18 +75,25 @@ impl<'a> Snapshot<'a> {
             names.zip(last).take(width).map(move |(name, half)| (at, name, half::from_bits(half)))
         })
     }
+}
 
-    pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(16).time(self.at).time(self.first);
+impl<'a> Field<'a> for Snapshot<'a> {
+    fn times(&self, sink: &mut Sink<'_>) {
+        sink.time(self.at).time(self.first);
+    }
+
+    fn numbers(&self, sink: &mut Sink<'_>) {
         for change in self.values.as_chunks().0 {
             sink.half(u16::from_le_bytes(*change));
         }
+    }
+
+    fn bytes(&self, sink: &mut Sink<'_>) {
         sink.name(self.check).u8(self.instance).u8(self.subsystem as u8).u8(u8::from(self.after));
         sink.bytes(&(self.interval.as_millis() as u16).to_le_bytes()).u8(self.width);
     }
 
-    /// `None` for an unknown subsystem.
-    pub(super) fn read(fields: &mut Fields<'a>) -> Option<Self> {
+    fn read(fields: &mut Fields<'a>) -> Option<Self> {
         Some(Self {
             at: fields.instant(),
             check: fields.text(),
@@ -124,37 +131,24 @@ impl Default for SnapshotValues {
     }
 }
 
-/// A step of the protective action.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Protection {
-    /// Requested action.
-    pub action: Action,
-    /// The stage.
-    pub stage: Stage,
-    /// Seconds, attempt or `MAV_RESULT`, by the stage.
-    pub detail: u8,
-    /// `MAV_CMD`
-    pub command: u16,
+record! {
+    /// A step of the protective action.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    Protection {
+        /// Requested action.
+        action: Action,
+        /// The stage.
+        stage: Stage,
+        /// Seconds, attempt or `MAV_RESULT`, by the stage.
+        detail: u8,
+        /// `MAV_CMD`
+        command: u16,
+    }
 }
 
 impl Protection {
     /// To be written.
     pub const fn new(step: &hums_core::protect::Step) -> Self {
         Self { action: step.action, stage: step.stage, detail: step.detail, command: step.action.command() }
-    }
-
-    pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(17).u8(self.action as u8).u8(self.stage as u8).u8(self.detail);
-        sink.bytes(&self.command.to_le_bytes());
-    }
-
-    /// `None` for an unknown action or stage.
-    pub(super) fn read(fields: &mut Fields<'_>) -> Option<Self> {
-        Some(Self {
-            action: Action::from_number(fields.u8())?,
-            stage: Stage::from_number(fields.u8())?,
-            detail: fields.u8(),
-            command: u16::from_le_bytes(fields.array()),
-        })
     }
 }

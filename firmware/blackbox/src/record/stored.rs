@@ -2,6 +2,10 @@
 //! the numbers of any record, also of later kinds.
 
 use hums_core::clock::Instant;
+use hums_core::component::{ComponentFigures, ComponentKind, Status};
+use hums_core::health::exceedance::Crossings;
+use hums_core::health::{Level, Subsystem};
+use hums_core::protect::{Action, Stage};
 
 use crate::bytes::ByteFields;
 use crate::limits::{NAME_BYTES_MAX, TEXT_BYTES_MAX};
@@ -117,6 +121,180 @@ impl<'a> Fields<'a> {
     }
 }
 
+/// A part of a record. A record stores its times first, then all other numbers, then all bytes.
+pub(crate) trait Field<'a>: Sized {
+    fn times(&self, _: &mut Sink<'_>) {}
+    fn numbers(&self, _: &mut Sink<'_>) {}
+    fn bytes(&self, _: &mut Sink<'_>) {}
+    /// `None` for a number that this reader does not know.
+    fn read(fields: &mut Fields<'a>) -> Option<Self>;
+}
+
+macro_rules! field {
+    ($type:ty, $part:ident, |$value:ident, $sink:ident| $store:expr, |$fields:ident| $read:expr) => {
+        impl<'a> Field<'a> for $type {
+            fn $part(&self, $sink: &mut Sink<'_>) {
+                let $value = self;
+                $store;
+            }
+
+            fn read($fields: &mut Fields<'a>) -> Option<Self> {
+                $read
+            }
+        }
+    };
+    ($type:ty) => {
+        field!($type, bytes, |value, sink| sink.u8(*value as u8), |fields| Self::from_number(fields.u8()));
+    };
+    ($type:ty, else $unknown:expr) => {
+        field!($type, bytes, |value, sink| sink.u8(*value as u8), |fields| {
+            Some(Self::from_number(fields.u8()).unwrap_or($unknown))
+        });
+    };
+}
+
+field!(Instant, times, |at, sink| sink.time(*at), |fields| Some(fields.instant()));
+field!(u32, numbers, |value, sink| sink.u32(*value), |fields| Some(fields.u32()));
+field!(u64, numbers, |value, sink| sink.u64(*value), |fields| Some(fields.u64()));
+field!(f32, numbers, |value, sink| sink.f32(*value), |fields| Some(fields.f32()));
+field!(f64, numbers, |value, sink| sink.f64(*value), |fields| Some(fields.f64()));
+field!(u8, bytes, |value, sink| sink.u8(*value), |fields| Some(fields.u8()));
+field!(bool, bytes, |value, sink| sink.u8(u8::from(*value)), |fields| Some(fields.u8() != 0));
+field!(u16, bytes, |value, sink| sink.bytes(&value.to_le_bytes()), |fields| {
+    Some(u16::from_le_bytes(fields.array()))
+});
+field!((u8, u8), bytes, |value, sink| sink.u8(value.0).u8(value.1), |fields| {
+    Some((fields.u8(), fields.u8()))
+});
+field!([u8; 12], bytes, |value, sink| sink.bytes(value), |fields| Some(fields.array()));
+field!(&'a str, bytes, |value, sink| sink.name(value), |fields| Some(fields.text()));
+field!(Subsystem);
+field!(Level);
+field!(Action);
+field!(Stage);
+field!(ComponentKind, else Self::default());
+field!(Status, else Self::Red);
+
+impl<'a> Field<'a> for [u32; 12] {
+    fn numbers(&self, sink: &mut Sink<'_>) {
+        for number in self {
+            number.numbers(sink);
+        }
+    }
+
+    fn read(fields: &mut Fields<'a>) -> Option<Self> {
+        Some(core::array::from_fn(|_| fields.u32()))
+    }
+}
+
+impl<'a> Field<'a> for Crossings {
+    fn numbers(&self, sink: &mut Sink<'_>) {
+        sink.u32(u32::from(self.warnings)).u32(u32::from(self.criticals));
+        sink.u32(self.warning_tenths).u32(self.critical_tenths).f32(self.peak);
+    }
+
+    fn read(fields: &mut Fields<'a>) -> Option<Self> {
+        Some(Self {
+            warnings: fields.u32().try_into().unwrap_or(u16::MAX),
+            criticals: fields.u32().try_into().unwrap_or(u16::MAX),
+            warning_tenths: fields.u32(),
+            critical_tenths: fields.u32(),
+            peak: fields.f32(),
+        })
+    }
+}
+
+impl<'a> Field<'a> for ComponentFigures {
+    fn numbers(&self, sink: &mut Sink<'_>) {
+        sink.f64(self.powered_s).f64(self.flight_s).f64(self.motor_s).f64(self.flights).f64(self.cycles);
+    }
+
+    fn read(fields: &mut Fields<'a>) -> Option<Self> {
+        Some(Self {
+            powered_s: fields.f64(),
+            flight_s: fields.f64(),
+            motor_s: fields.f64(),
+            flights: fields.f64(),
+            cycles: fields.f64(),
+        })
+    }
+}
+
+/// A struct whose fields are stored in their order, times before other numbers; new ones come last. A last text may be longer than a name.
+macro_rules! record {
+    (
+        $(#[$meta:meta])* $name:ident $(<$life:lifetime>)? {
+            $($(#[$doc:meta])+ $field:ident: $type:ty,)+
+        }
+        $(text { $(#[$text_doc:meta])+ $text:ident: $text_type:ty, })?
+    ) => {
+        $(#[$meta])*
+        pub struct $name $(<$life>)? {
+            $($(#[$doc])+ pub $field: $type,)+
+            $($(#[$text_doc])+ pub $text: $text_type,)?
+        }
+
+        impl<'a> Field<'a> for $name $(<$life>)? {
+            fn times(&self, sink: &mut Sink<'_>) {
+                $(Field::times(&self.$field, sink);)+
+            }
+
+            fn numbers(&self, sink: &mut Sink<'_>) {
+                $(Field::numbers(&self.$field, sink);)+
+            }
+
+            fn bytes(&self, sink: &mut Sink<'_>) {
+                $(Field::bytes(&self.$field, sink);)+
+                $(sink.text(self.$text);)?
+            }
+
+            fn read(fields: &mut Fields<'a>) -> Option<Self> {
+                Some(Self { $($field: Field::read(fields)?,)+ $($text: fields.text(),)? })
+            }
+        }
+    };
+}
+pub(super) use record;
+
+/// An enumeration whose numbers are stored, and the variant that stands for an unknown one, if there is one.
+macro_rules! numbered {
+    (
+        $(#[$meta:meta])* $name:ident { $($(#[$doc:meta])+ $variant:ident = $number:literal $text:literal,)+ }
+        $(else $unknown:ident)?
+    ) => {
+        $(#[$meta])*
+        #[repr(u8)]
+        pub enum $name {
+            $($(#[$doc])+ $variant = $number,)+
+        }
+
+        impl $name {
+            /// The name that reports use.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $text,)+
+                }
+            }
+        }
+
+        impl<'a> Field<'a> for $name {
+            fn bytes(&self, sink: &mut Sink<'_>) {
+                sink.u8(*self as u8);
+            }
+
+            fn read(fields: &mut Fields<'a>) -> Option<Self> {
+                match fields.u8() {
+                    $($number => Some(Self::$variant),)+
+                    $(_ => Some(Self::$unknown),)?
+                    #[allow(unreachable_patterns, reason = "not every one has such a variant")]
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+pub(super) use numbered;
+
 /// Words (times first), halves, then bytes. Remembers an overflow.
 pub(crate) struct Sink<'a> {
     out: &'a mut [u8],
@@ -133,7 +311,14 @@ impl<'a> Sink<'a> {
         (self.len <= self.out.len()).then_some(self.len)
     }
 
-    pub(crate) fn head(&mut self, kind: u8) -> &mut Self {
+    pub(crate) fn record<'r>(&mut self, kind: u8, record: &impl Field<'r>) {
+        self.head(kind);
+        record.times(self);
+        record.numbers(self);
+        record.bytes(self);
+    }
+
+    fn head(&mut self, kind: u8) -> &mut Self {
         self.bytes(&[kind, VERSION, 0, 0])
     }
 

@@ -1,19 +1,20 @@
 //! Usage counters at one moment: of the session, and of the airframe's life.
 
-use super::stored::{Fields, HEAD_BYTES, Sink};
+use super::stored::{Field, Fields, HEAD_BYTES, Sink, numbered};
 use crate::limits::RECORD_BYTES_MAX;
 
-/// The numbers are stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Moment {
-    /// At the start of the session.
-    Start = 0,
-    /// While running.
-    #[default]
-    Periodic = 1,
-    /// At the end of a flight or of the session.
-    End = 2,
+numbered! {
+    /// The numbers are stored.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    Moment {
+        /// At the start of the session.
+        Start = 0 "start",
+        /// While running.
+        #[default]
+        Periodic = 1 "periodic",
+        /// At the end of a flight or of the session.
+        End = 2 "end",
+    } else Periodic
 }
 
 /// Head, moment and entries fit `RECORD_BYTES_MAX` whatever the numbers are.
@@ -107,25 +108,6 @@ fn end_run(run: Option<(u8, u8)>, sink: &mut Sink<'_>) {
     }
 }
 
-impl Moment {
-    pub(super) const fn from_number(number: u8) -> Self {
-        match number {
-            0 => Self::Start,
-            2 => Self::End,
-            _ => Self::Periodic,
-        }
-    }
-
-    /// The name that reports use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Start => "start",
-            Self::Periodic => "periodic",
-            Self::End => "end",
-        }
-    }
-}
-
 impl<'a> Usage<'a> {
     /// Numbers with values, to be written.
     pub const fn new(moment: Moment, entries: &'a [(u8, f32)]) -> Self {
@@ -136,14 +118,19 @@ impl<'a> Usage<'a> {
     pub fn iter(&self) -> impl Iterator<Item = (u8, f32)> + 'a {
         self.entries.iter(USAGE_ENTRIES_MAX)
     }
+}
 
-    pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        self.entries.store_values(USAGE_ENTRIES_MAX, sink.head(6));
+impl<'a> Field<'a> for Usage<'a> {
+    fn numbers(&self, sink: &mut Sink<'_>) {
+        self.entries.store_values(USAGE_ENTRIES_MAX, sink);
+    }
+
+    fn bytes(&self, sink: &mut Sink<'_>) {
         self.entries.store_numbers(USAGE_ENTRIES_MAX, sink.u8(self.moment as u8));
     }
 
-    pub(super) fn read(fields: &mut Fields<'a>) -> Self {
-        Self { moment: Moment::from_number(fields.u8()), entries: Entries::read(fields) }
+    fn read(fields: &mut Fields<'a>) -> Option<Self> {
+        Some(Self { moment: Field::read(fields)?, entries: Entries::read(fields) })
     }
 }
 
@@ -165,23 +152,28 @@ impl<'a> Lifetime<'a> {
     pub fn iter(&self) -> impl Iterator<Item = (u8, f32)> + 'a {
         self.entries.iter(LIFETIME_ENTRIES_MAX)
     }
+}
 
-    pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(12).u64(self.uid).u32(self.boots).u32(self.sessions);
+impl<'a> Field<'a> for Lifetime<'a> {
+    fn numbers(&self, sink: &mut Sink<'_>) {
+        sink.u64(self.uid).u32(self.boots).u32(self.sessions);
         self.entries.store_values(LIFETIME_ENTRIES_MAX, sink);
+    }
+
+    fn bytes(&self, sink: &mut Sink<'_>) {
         sink.u8(self.moment as u8).u8(self.system);
         self.entries.store_numbers(LIFETIME_ENTRIES_MAX, sink);
     }
 
-    pub(super) fn read(fields: &mut Fields<'a>) -> Self {
-        Self {
-            moment: Moment::from_number(fields.u8()),
+    fn read(fields: &mut Fields<'a>) -> Option<Self> {
+        Some(Self {
+            moment: Field::read(fields)?,
             system: fields.u8(),
             uid: fields.u64(),
             boots: fields.u32(),
             sessions: fields.u32(),
             entries: Entries::read(fields),
-        }
+        })
     }
 }
 

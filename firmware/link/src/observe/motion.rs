@@ -59,43 +59,30 @@ const fn milliseconds(us: u64) -> Option<NonZeroU32> {
     NonZeroU32::new((us / 1_000) as u32)
 }
 
-pub(super) fn gnss(payload: &[u8]) -> Option<Gnss> {
-    const FIX: usize = 28;
-    let gps = read::<ap::GPS_RAW_INT_DATA>(payload, &[FIX])?;
-    let fix = Fields(payload).u8(FIX);
-    let has_position = fix >= FIX_2D;
-    Some(Gnss {
-        instance: 0,
-        fix,
-        satellites: unless(gps.satellites_visible, u8::MAX),
-        hdop: dilution(gps.eph),
-        accuracy: error(gps.h_acc),
-        speed: speed(gps.vel),
-        course: course(gps.cog),
-        measured_ms: milliseconds(gps.time_usec),
-        position: position(gps.lat, gps.lon).filter(|_| has_position),
-        altitude: has_position.then(|| Metres(gps.alt as f32 / 1e3)),
-    })
+/// The messages of both receivers have fields of the same names; the fix is at byte `$fix`.
+macro_rules! gnss {
+    ($name:ident, $message:ty, $instance:literal, $fix:literal) => {
+        pub(super) fn $name(payload: &[u8]) -> Option<Gnss> {
+            let gps = read::<$message>(payload, &[$fix])?;
+            let fix = Fields(payload).u8($fix);
+            let has_position = fix >= FIX_2D;
+            Some(Gnss {
+                instance: $instance,
+                fix,
+                satellites: unless(gps.satellites_visible, u8::MAX),
+                hdop: dilution(gps.eph),
+                accuracy: error(gps.h_acc),
+                speed: speed(gps.vel),
+                course: course(gps.cog),
+                measured_ms: milliseconds(gps.time_usec),
+                position: position(gps.lat, gps.lon).filter(|_| has_position),
+                altitude: has_position.then(|| Metres(gps.alt as f32 / 1e3)),
+            })
+        }
+    };
 }
-
-pub(super) fn gnss2(payload: &[u8]) -> Option<Gnss> {
-    const FIX: usize = 32;
-    let gps = read::<ap::GPS2_RAW_DATA>(payload, &[FIX])?;
-    let fix = Fields(payload).u8(FIX);
-    let has_position = fix >= FIX_2D;
-    Some(Gnss {
-        instance: 1,
-        fix,
-        satellites: unless(gps.satellites_visible, u8::MAX),
-        hdop: dilution(gps.eph),
-        accuracy: error(gps.h_acc),
-        speed: speed(gps.vel),
-        course: course(gps.cog),
-        measured_ms: milliseconds(gps.time_usec),
-        position: position(gps.lat, gps.lon).filter(|_| has_position),
-        altitude: has_position.then(|| Metres(gps.alt as f32 / 1e3)),
-    })
-}
+gnss!(gnss, ap::GPS_RAW_INT_DATA, 0, 28);
+gnss!(gnss2, ap::GPS2_RAW_DATA, 1, 32);
 
 /// `GNSS_INTEGRITY` is not in the typed dialect: number of the receiver at byte 8, jamming at 10, spoofing at 11.
 pub(super) fn gnss_integrity(payload: &[u8]) -> GnssIntegrity {

@@ -35,7 +35,6 @@ use super::library::builtin::{self, BuiltinFile};
 use super::limiter::{Limiter, Requester};
 use crate::journal::{By, Journal, Logbook};
 use crate::monitoring::PARTS_CHANGED;
-use crate::queues::SectorsIn;
 use crate::records;
 
 /// From the command to the end of the log: time for our answer.
@@ -97,7 +96,6 @@ impl Commands {
         command: u16,
         params: [f32; 7],
         book: &mut Logbook<'_>,
-        sectors: &mut SectorsIn,
     ) -> u8 {
         let mut reply = |reply| {
             self.replies.push(asker.port, reply);
@@ -140,7 +138,7 @@ impl Commands {
                 if !self.allows(now, asker.port) {
                     return CommandAck::TEMPORARILY_REJECTED;
                 }
-                self.act(now, asker, (command, number, &params), book, sectors)
+                self.act(now, asker, (command, number, &params), book)
             }
             _ => CommandAck::UNSUPPORTED,
         }
@@ -152,13 +150,12 @@ impl Commands {
         asker: Requester,
         (command, number, params): (u16, u32, &[f32; 7]),
         book: &mut Logbook<'_>,
-        sectors: &mut SectorsIn,
     ) -> u8 {
         let by = asker.by;
         match command {
             USER_2_CANCEL => {
                 let cancelled = book.monitor.cancel_protection();
-                book.journal.by_hand(now, format_args!("cancel by {}/{}", by.0, by.1), sectors);
+                book.journal.by_hand(now, format_args!("cancel by {}/{}", by.0, by.1));
                 if cancelled { CommandAck::ACCEPTED } else { CommandAck::FAILED }
             }
             LOGGING_STOP | STORAGE_FORMAT | USER_1_REPLACED | PREFLIGHT_REBOOT_SHUTDOWN
@@ -166,17 +163,17 @@ impl Commands {
             {
                 CommandAck::TEMPORARILY_REJECTED
             }
-            STORAGE_FORMAT => format(now, by, book, sectors),
+            STORAGE_FORMAT => format(now, by, book),
             PREFLIGHT_REBOOT_SHUTDOWN => {
                 if self.card_reader_asked.is_none() {
                     self.card_reader_asked = Some(now);
-                    book.journal.by_hand(now, format_args!("card reader by {}/{}", by.0, by.1), sectors);
+                    book.journal.by_hand(now, format_args!("card reader by {}/{}", by.0, by.1));
                     self.replies.push(asker.port, Reply::CardReader);
                 }
                 CommandAck::ACCEPTED
             }
             USER_1_REPLACED if number == 0 => {
-                book.journal.by_hand(now, format_args!("{PARTS_CHANGED} by {}/{}", by.0, by.1), sectors);
+                book.journal.by_hand(now, format_args!("{PARTS_CHANGED} by {}/{}", by.0, by.1));
                 CommandAck::ACCEPTED
             }
             USER_1_REPLACED => {
@@ -187,14 +184,14 @@ impl Commands {
                 let (new, known) =
                     (Label::new(serial), book.monitor.components().get(place).map(|part| part.serial));
                 let is_done = new != Label::default() && known == Some(new);
-                if is_done || records::replace_component(now, place, serial, by, book, sectors) {
+                if is_done || records::replace_component(now, place, serial, by, book) {
                     CommandAck::ACCEPTED
                 } else {
                     CommandAck::DENIED
                 }
             }
             _ => {
-                self.stop_or_record(now, command == LOGGING_STOP, asker, &mut book.journal, sectors);
+                self.stop_or_record(now, command == LOGGING_STOP, asker, &mut book.journal);
                 CommandAck::ACCEPTED
             }
         }
@@ -208,14 +205,13 @@ impl Commands {
         stop: bool,
         Requester { port, by }: Requester,
         journal: &mut Journal<'_>,
-        sectors: &mut SectorsIn,
     ) {
         if self.stopped == stop {
             return;
         }
         self.stopped = stop;
         let what = if stop { "stopped" } else { "started" };
-        journal.by_hand(now, format_args!("recording {what} by {}/{}", by.0, by.1), sectors);
+        journal.by_hand(now, format_args!("recording {what} by {}/{}", by.0, by.1));
         if stop {
             self.replies.push(port, Reply::Stopped);
         }
@@ -223,11 +219,11 @@ impl Commands {
 }
 
 /// Formats only a card without HUMS logs: no radio command may destroy logs.
-fn format(now: Instant, by: By, book: &mut Logbook<'_>, sectors: &mut SectorsIn) -> u8 {
+fn format(now: Instant, by: By, book: &mut Logbook<'_>) -> u8 {
     let state = book.card.read().state;
     let may = state.wants_format();
     let what = if may { "card is formatted" } else { "formatting refused, asked" };
-    book.journal.by_hand(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
+    book.journal.by_hand(now, format_args!("{what} by {}/{}", by.0, by.1));
     match state {
         _ if may => {
             book.card.want_format();

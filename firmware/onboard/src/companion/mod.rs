@@ -22,21 +22,20 @@ use hums_core::observation::CommandAck;
 use hums_core::parameters::{Param, Params, TABLE};
 use hums_core::{Monitor, protect};
 use hums_link::asking::{Asking, KnownVehicle};
-use hums_link::encode::{COMPONENT, FRAME_BYTES_MAX};
+use hums_link::encode::COMPONENT;
 use hums_link::events::Events;
 use hums_link::frame::Frame;
 use hums_link::messages;
-use hums_link::outlet::{self, Class, Outlet};
+use hums_link::outlet::Class;
 use hums_link::packet::Fields;
 use hums_link::request::{self, AddressedRequest, Port, Reply, Request};
-use hums_link::signing::{Key, SIGNATURE_BYTES, Seal};
-use hums_link::summary::{self, Forwards, Summary};
+use hums_link::signing::{Key, Seal};
+use hums_link::summary::{self, Forwards};
 use hums_link::{ids, mav_cmd};
 
 use crate::journal::{Journal, Logbook};
-use crate::notices::Notices;
 use crate::persist::{Handover, StoreWriter};
-use crate::queues::{GsIn, SectorsIn, SummaryRoute};
+use crate::queues::{GsIn, SummaryRoute};
 use commands::Commands;
 use library::Library;
 use limiter::Requester;
@@ -45,20 +44,13 @@ use secure::{RequestSigning, Trust};
 use settings::Settings;
 use ways::Outlets;
 
-/// Bytes that may wait at the autopilot's port. Its queue has room for them, for as many of the summary where the
-/// autopilot carries it, and for the longest frame.
-const WAITING_BYTES: u32 = 400;
-/// Budget of the USB port, bytes a second. A packet of 64 bytes takes some 5,000 cycles, so this takes 1 % of the processor.
-const USB_BUDGET: u32 = 20_000;
 /// Interval of heartbeats to the autopilot, which routes messages only to known systems.
 const HEARTBEAT: Span = Span::from_secs(1);
 /// The monitor itself: no answer is expected.
 const NOBODY: Requester = Requester { port: Port::Gs, by: (0, 0) };
 
-#[derive(Clone, Debug)]
-pub(crate) struct Companion {
-    outlet: Outlet,
-    usb: Outlet,
+pub(crate) struct Companion<'a> {
+    pub(crate) ways: Outlets<'a>,
     asking: Asking,
     events: Events,
     commands: Commands,
@@ -70,15 +62,10 @@ pub(crate) struct Companion {
     settings: Settings,
 }
 
-impl Companion {
-    pub(crate) const fn new(params: &Params) -> Self {
+impl<'a> Companion<'a> {
+    pub(crate) fn new(params: &Params, queues: GsIn<'a>) -> Self {
         Self {
-            outlet: Outlet::new(
-                params.get(Param::ApBudget) as u32,
-                params.get(Param::ApBaud) as u32,
-                WAITING_BYTES,
-            ),
-            usb: Outlet::new(USB_BUDGET, outlet::NO_LINE, FRAME_BYTES_MAX as u32),
+            ways: Outlets::new(params, queues),
             asking: Asking::new(),
             events: Events::new(),
             commands: Commands::new(),
@@ -91,9 +78,9 @@ impl Companion {
         }
     }
 
-    /// Current.
-    pub(crate) const fn baud(&self) -> u32 {
-        self.outlet.baud()
+    /// Current ones of the ground station's port and of the autopilot's.
+    pub(crate) const fn bauds(&self) -> (u32, u32) {
+        (self.ways.summary.outlet.baud(), self.ways.autopilot.baud())
     }
 
     pub(crate) const fn stopped(&self) -> bool {
@@ -117,68 +104,18 @@ impl Companion {
         self.secure.restore(store_writer);
     }
 
-    pub(crate) fn save(&mut self, now: Instant, summary: &Summary, handover: &mut Handover<'_>) -> bool {
-        let seals = [&summary.outlet.seal, &self.outlet.seal, &self.usb.seal];
-        self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover)
+    pub(crate) fn save(&mut self, now: Instant, handover: &mut Handover<'_>) -> bool {
+        let seals = self.ways.all().into_iter().filter_map(|outlet| outlet.seal.as_ref());
+        self.secure.save(now, seals.map(Seal::last).max(), handover)
     }
 
-    /// Our frames of the summary stream: to its carrier, and to the USB port while that is open.
-    pub(crate) fn tell(&mut self, now: Instant, frame: &[u8], gs: &mut GsIn) {
-        gs.tell(frame);
-        self.tell_usb(now, frame, gs);
-    }
-
-    /// The vehicle's, likewise. The autopilot does not carry its own frames.
-    pub(crate) fn forward(&mut self, now: Instant, frame: &[u8], gs: &mut GsIn) {
-        if gs.route() == SummaryRoute::Port {
-            gs.tell(frame);
-        }
-        self.tell_usb(now, frame, gs);
-    }
-
-    // Own stack frame (ARCHITECTURE.md, Memory).
-    #[inline(never)]
-    fn tell_usb(&mut self, now: Instant, frame: &[u8], gs: &mut GsIn) {
-        if !gs.is_open(Port::Usb) {
-            return;
-        }
-        let has_room = gs.has_room(Port::Usb, frame.len() + SIGNATURE_BYTES);
-        let mut out = |bytes: &[u8]| gs.send(Port::Usb, bytes);
-        // Ours have been selected: here they are all alike.
-        let is_sent = has_room
-            && match self.usb.encoder.message_of(frame) {
-                Some(packet) => self.usb.send(now, Class::Critical, &packet, &mut out),
-                None => self.usb.pass(now, Class::Event, frame, &mut out),
-            };
-        if !is_sent {
-            gs.lose(Port::Usb);
-        }
-    }
-
-    pub(crate) fn uplink(
-        &mut self,
-        now: Instant,
-        (port, frame): (Port, &Frame<'_>),
-        book: &mut Logbook<'_>,
-        summary: &mut Summary,
-        sectors: &mut SectorsIn,
-        gs: &mut GsIn,
-    ) {
-        self.asked(now, port, frame, book, sectors);
-        let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
-        self.pass.up(now, port, frame, book.monitor, &mut Outlets { outlets, queues: gs });
+    pub(crate) fn uplink(&mut self, now: Instant, (port, frame): (Port, &Frame<'_>), book: &mut Logbook<'_>) {
+        self.asked(now, port, frame, book);
+        self.pass.up(now, port, frame, book.monitor, &mut self.ways);
     }
 
     /// An answer to us, a request, or data.
-    pub(crate) fn heard(
-        &mut self,
-        now: Instant,
-        frame: &Frame<'_>,
-        book: &mut Logbook<'_>,
-        summary: &mut Summary,
-        sectors: &mut SectorsIn,
-        gs: &mut GsIn,
-    ) {
+    pub(crate) fn heard(&mut self, now: Instant, frame: &Frame<'_>, book: &mut Logbook<'_>) {
         if self.asking.of() == Some(frame.source()) {
             self.asking.seen(frame.id());
             self.events.heard(frame.id(), frame.payload());
@@ -190,38 +127,23 @@ impl Companion {
             if frame.id() == ids::COMMAND_ACK {
                 let fields = Fields(frame.payload());
                 let target = (fields.u8(8), fields.u8(9));
-                if messages::concerns_us(target, self.outlet.encoder.system()) {
+                if messages::concerns_us(target, self.ways.autopilot.encoder.system()) {
                     self.asking.answered(fields.u16(0), fields.u8(2));
                 }
             }
         }
-        self.asked(now, Port::Autopilot, frame, book, sectors);
-        self.pass_down(now, frame, book, summary, gs);
+        self.asked(now, Port::Autopilot, frame, book);
+        self.pass_down(now, frame, book);
     }
 
     /// Passed from the autopilot's port to the ground station, if it should be.
-    pub(crate) fn pass_down(
-        &mut self,
-        now: Instant,
-        frame: &Frame<'_>,
-        book: &Logbook<'_>,
-        summary: &mut Summary,
-        gs: &mut GsIn,
-    ) {
-        let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
-        self.pass.down(now, frame, book.monitor, &mut Outlets { outlets, queues: gs });
+    pub(crate) fn pass_down(&mut self, now: Instant, frame: &Frame<'_>, book: &Logbook<'_>) {
+        self.pass.down(now, frame, book.monitor, &mut self.ways);
     }
 
-    fn asked(
-        &mut self,
-        now: Instant,
-        port: Port,
-        frame: &Frame<'_>,
-        book: &mut Logbook<'_>,
-        sectors: &mut SectorsIn,
-    ) {
+    fn asked(&mut self, now: Instant, port: Port, frame: &Frame<'_>, book: &mut Logbook<'_>) {
         let Some(asked) = request::read(frame) else { return };
-        let system = self.outlet.encoder.system();
+        let system = self.ways.autopilot.encoder.system();
         if !messages::concerns_us(asked.target, system) {
             return;
         }
@@ -232,7 +154,7 @@ impl Companion {
         if let Request::Key(key, stamp) = asked.request {
             // Only if it is addressed to us, by the guide: never a broadcast.
             if asked.target == (system, COMPONENT) {
-                self.key_brought(now, asker, key, stamp, book, sectors);
+                self.key_brought(now, asker, key, stamp, book);
             }
             return;
         }
@@ -243,7 +165,7 @@ impl Companion {
                 let may =
                     self.secure.may_set(book.monitor, port, param, trust) && self.commands.allows(now, port);
                 // Also after a refusal the answer is the current value.
-                if may && book.set_parameter(now, name, value, asker.by, sectors) {
+                if may && book.set_parameter(now, name, value, asker.by) {
                     self.secure.changed(trust);
                 }
                 self.commands.replies.push(port, Reply::Param(param as u16));
@@ -254,7 +176,7 @@ impl Companion {
             {
                 let result = match trust {
                     Trust::Refused => CommandAck::DENIED,
-                    _ => self.commands.command(now, asker, command, params, book, sectors),
+                    _ => self.commands.command(now, asker, command, params, book),
                 };
                 if result == CommandAck::ACCEPTED && !commands::only_asks(command) {
                     self.secure.changed(trust);
@@ -265,7 +187,7 @@ impl Companion {
                 }
             }
             _ if trust == Trust::Refused => {}
-            _ => self.asked_for_data(now, asker, trust, &asked, book, sectors),
+            _ => self.asked_for_data(now, asker, trust, &asked, book),
         }
     }
 
@@ -276,7 +198,6 @@ impl Companion {
         trust: Trust,
         asked: &AddressedRequest<'_>,
         book: &mut Logbook<'_>,
-        sectors: &mut SectorsIn,
     ) {
         let replies = &mut self.commands.replies;
         match asked.request {
@@ -289,7 +210,7 @@ impl Companion {
                     replies.push(asker.port, Reply::Param(param as u16));
                 }
             }
-            Request::LogErase if asked.target.1 != 0 => self.erase(now, asker, trust, book, sectors),
+            Request::LogErase if asked.target.1 != 0 => self.erase(now, asker, trust, book),
             // Only with our component id: the autopilot has logs and files of its own.
             ref about_logs if asked.target.1 != 0 => {
                 self.library.asked(asker, about_logs);
@@ -304,14 +225,13 @@ impl Companion {
         Requester { port, by }: Requester,
         trust: Trust,
         book: &mut Logbook<'_>,
-        sectors: &mut SectorsIn,
     ) {
         if !self.commands.allows(now, port) {
             return;
         }
         let may = !book.may_fly(now);
         let what = if may { "logs erased" } else { "erasing refused in flight, asked" };
-        book.journal.by_hand(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
+        book.journal.by_hand(now, format_args!("{what} by {}/{}", by.0, by.1));
         if may {
             self.library.erases = true;
             self.commands.replies.push(port, Reply::Erased);
@@ -326,7 +246,6 @@ impl Companion {
         key: Key,
         stamp: u64,
         book: &mut Logbook<'_>,
-        sectors: &mut SectorsIn,
     ) {
         if !self.commands.allows(now, port) {
             return;
@@ -337,7 +256,7 @@ impl Companion {
             (true, false) => "set",
             (true, true) => "removed",
         };
-        book.journal.by_hand(now, format_args!("signing key {what} by {}/{}", by.0, by.1), sectors);
+        book.journal.by_hand(now, format_args!("signing key {what} by {}/{}", by.0, by.1));
         if takes {
             self.secure.set_key(now, key, stamp);
             self.commands.replies.push(port, Reply::Keyed(!key.is_none()));
@@ -345,56 +264,43 @@ impl Companion {
     }
 
     /// Withholds a key at the autopilot's port from the record, which gets an event.
-    pub(crate) fn withhold(
-        &mut self,
-        now: Instant,
-        frame: &Frame<'_>,
-        journal: &mut Journal<'_>,
-        sectors: &mut SectorsIn,
-    ) {
+    pub(crate) fn withhold(&mut self, now: Instant, frame: &Frame<'_>, journal: &mut Journal<'_>) {
         let (system, component) = (frame.system(), frame.component());
         if self.commands.allows(now, Port::Autopilot) {
-            journal.by_hand(now, format_args!("a key of {system}/{component} is not recorded"), sectors);
+            journal.by_hand(now, format_args!("a key of {system}/{component} is not recorded"));
         }
     }
 
     #[inline(never)]
-    pub(crate) fn converse(
-        &mut self,
-        now: Instant,
-        book: &mut Logbook<'_>,
-        summary: &mut Summary,
-        notices: &mut Notices,
-        sectors: &mut SectorsIn,
-        gs: &mut GsIn,
-    ) {
-        gs.set_route(match book.monitor.params().get(Param::GsPath) as u8 {
+    pub(crate) fn converse(&mut self, now: Instant, book: &mut Logbook<'_>) {
+        let Outlets { summary, queues, .. } = &mut self.ways;
+        queues.set_route(match book.monitor.params().get(Param::GsPath) as u8 {
             0 => SummaryRoute::Nobody,
             2 => SummaryRoute::Autopilot,
             _ => SummaryRoute::Port,
         });
-        summary.forwards = match gs.route() {
+        summary.forwards = match queues.route() {
             SummaryRoute::Port => Forwards::Budgeted,
-            _ if gs.is_open(Port::Usb) => Forwards::Apart,
+            _ if queues.is_open(Port::Usb) => Forwards::Apart,
             _ => Forwards::Nothing,
         };
         if self.commands.stopped() && book.monitor.vehicle().armed() {
-            self.commands.stop_or_record(now, false, NOBODY, &mut book.journal, sectors);
+            self.commands.stop_or_record(now, false, NOBODY, &mut book.journal);
         }
-        let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
-        self.secure.seal(now, gs.route(), book.monitor, outlets);
-        self.tell_autopilot(now, book.monitor, gs);
-        self.settings.tick(now, &mut self.library, book, notices, sectors, &mut gs.shelf);
+        self.secure.seal(now, book.monitor, &mut self.ways);
+        self.tell_autopilot(now, book.monitor);
+        self.settings.tick(now, &mut self.library, book, &mut self.ways.queues.shelf);
     }
 
-    fn tell_autopilot(&mut self, now: Instant, monitor: &mut Monitor, gs: &mut GsIn) {
-        let Self { outlet, usb, asking, events, heartbeat_at, protect, .. } = self;
+    fn tell_autopilot(&mut self, now: Instant, monitor: &mut Monitor) {
+        let Self { ways, asking, events, heartbeat_at, protect, .. } = self;
+        let Outlets { autopilot: outlet, usb, queues, .. } = ways;
         if let Some(request) = monitor.take_request() {
             *protect = Some(request);
         }
         let params = monitor.params();
         outlet.set(now, params.get(Param::ApBudget) as u32, params.get(Param::ApBaud) as u32);
-        let mut out = |bytes: &[u8]| gs.autopilot.put(bytes);
+        let mut out = |bytes: &[u8]| queues.autopilot.put(bytes);
         if let Some(source) = monitor.vehicle().source {
             outlet.encoder.set_system(source.system);
             usb.encoder.set_system(source.system);
@@ -426,17 +332,8 @@ impl Companion {
         }
     }
 
-    pub(crate) fn answer(
-        &mut self,
-        now: Instant,
-        monitor: &Monitor,
-        identity: &Boot<'_>,
-        summary: &mut Summary,
-        gs: &mut GsIn,
-    ) {
-        let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
-        let mut ways = Outlets { outlets, queues: gs };
-        let replies = &mut self.commands.replies;
+    pub(crate) fn answer(&mut self, now: Instant, monitor: &Monitor, identity: &Boot<'_>) {
+        let Self { ways, commands: Commands { replies, .. }, .. } = self;
         for _ in 0..replies.len() {
             let Some((port, reply)) = replies.first() else { break };
             let packet = commands::packet(now, reply, monitor, identity);
@@ -457,7 +354,7 @@ impl Companion {
         }
         // Meanwhile the card's answers are not for downloads.
         if !self.settings.is_reading()
-            && let Some((port, told)) = self.library.lend(now, &mut ways)
+            && let Some((port, told)) = self.library.lend(now, &mut self.ways)
         {
             self.commands.replies.push(port, told);
         }
@@ -484,7 +381,8 @@ mod tests {
     use hums_link::statustext::Severity;
 
     use super::*;
-    use crate::queues::{Ends, Queues};
+    use crate::queues::{Ends, MonitorEnds, Queues};
+    use hums_link::encode::FRAME_BYTES_MAX;
 
     const NOW: Instant = Instant::from_millis(5_000);
 
@@ -493,29 +391,26 @@ mod tests {
         let text = messages::status_text(Severity::Critical, &"x".repeat(50));
         for bytes in [20, 40, 109, 263] {
             let mut queues = Box::new(Queues::new());
-            let Ends { mut gs_in, usb_out, .. } = queues.split();
+            let (MonitorEnds { gs, .. }, Ends { usb_out, .. }) = queues.split();
             usb_out.open();
-            let params = Params::defaults();
-            let (mut companion, mut summary) = (Companion::new(&params), Summary::new(&params));
+            let mut ways = Outlets::new(&Params::defaults(), gs);
             let bulk = Packet::new(ids::LOG_DATA).bytes(0, &vec![1; bytes - 12][..]);
-            let outlets = [&mut summary.outlet, &mut companion.outlet, &mut companion.usb];
-            let mut ways = Outlets { outlets, queues: &mut gs_in };
             let taken = (0..99).take_while(|_| ways.send(NOW, Port::Usb, Class::Bulk, &bulk)).count();
             assert!(taken >= 2, "{taken} of {bytes} bytes");
             let mut out = [0; FRAME_BYTES_MAX];
             for _ in 0..3 {
-                companion.tell(NOW, Encoder::new().frame(&mut out, &text), &mut gs_in);
+                ways.summarise(NOW, |_, tell| tell(Encoder::new().frame(&mut out, &text)));
             }
-            assert_eq!(gs_in.lost(), 0, "behind {bytes} bytes");
+            assert_eq!(ways.queues.lost(), 0, "behind {bytes} bytes");
         }
     }
 
     #[test]
     fn the_autopilot_never_gets_its_own_frames_whether_usb_is_open_or_not() {
         let mut queues = Box::new(Queues::new());
-        let Ends { mut gs_in, mut usb_out, .. } = queues.split();
-        let mut companion = Companion::new(&Params::defaults());
-        gs_in.set_route(SummaryRoute::Autopilot);
+        let (MonitorEnds { gs, .. }, Ends { mut usb_out, .. }) = queues.split();
+        let mut ways = Outlets::new(&Params::defaults(), gs);
+        ways.queues.set_route(SummaryRoute::Autopilot);
         let (mut out, mut usb_frames) = ([0; FRAME_BYTES_MAX], 0);
         let text = messages::status_text(Severity::Notice, "x");
         for is_open in [true, false] {
@@ -525,12 +420,13 @@ mod tests {
                 usb_out.close();
             }
             let mut frame = [0; FRAME_BYTES_MAX];
-            companion.forward(NOW, Encoder::of(1, 1).frame(&mut frame, &text), &mut gs_in);
-            companion.tell(NOW, Encoder::new().frame(&mut frame, &text), &mut gs_in);
+            let theirs = Encoder::of(1, 1).frame(&mut frame, &text);
+            ways::queue_forwarded(NOW, theirs, &mut ways.usb, &mut ways.queues);
+            ways.summarise(NOW, |_, tell| tell(Encoder::new().frame(&mut frame, &text)));
             while usb_out.take(&mut out).is_some() {
                 usb_frames += 1;
             }
         }
-        assert_eq!((gs_in.autopilot.frames(), usb_frames, gs_in.lost()), (2, 2, 0));
+        assert_eq!((ways.queues.autopilot.frames(), usb_frames, ways.queues.lost()), (2, 2, 0));
     }
 }

@@ -31,11 +31,11 @@ use hums_core::clock::{Instant, Span};
 use hums_core::lifetime::Room;
 use hums_core::parameters::{Param, Params};
 use hums_link::frame::Frame;
-use hums_link::outlet::Outlet;
 use hums_link::request::Port;
 use hums_link::signing::{KEY_BYTES, Key, Seal, Signing, Times, Verdict, stamp};
 use hums_store::Key as Item;
 
+use super::ways::Outlets;
 use crate::persist::store_writer::SIGNED_MAX;
 use crate::persist::{Handover, StoreWriter};
 use crate::queues::SummaryRoute;
@@ -198,15 +198,9 @@ impl RequestSigning {
     }
 
     /// Keeps all outlets signing by the settings, in our time.
-    pub(crate) fn seal(
-        &mut self,
-        now: Instant,
-        route: SummaryRoute,
-        monitor: &Monitor,
-        outlets: [&mut Outlet; Port::ALL.len()],
-    ) {
+    pub(crate) fn seal(&mut self, now: Instant, monitor: &Monitor, ways: &mut Outlets) {
         let params = monitor.params();
-        let carries = if route == SummaryRoute::Autopilot { Port::Autopilot } else { Port::Gs };
+        let carries = if ways.queues.route() == SummaryRoute::Autopilot { Port::Autopilot } else { Port::Gs };
         let guards = [carries, Port::Autopilot, Port::Usb].map(|port| guard(params, port));
         let Self { signing, last, reseal, .. } = self;
         let reseal = core::mem::take(reseal);
@@ -214,7 +208,7 @@ impl RequestSigning {
         if let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) {
             signing.clock.hear_utc(Instant::of(at, now), stamp(utc_micros));
         }
-        for ((outlet, link), guard) in outlets.into_iter().zip(LINKS).zip(guards) {
+        for ((outlet, link), guard) in ways.all().into_iter().zip(LINKS).zip(guards) {
             match (signing.key().filter(|_| guard > 0), &mut outlet.seal) {
                 (Some(key), Some(seal)) if seal.is_of(key) && !reseal => seal.clock = signing.clock,
                 (Some(key), seal) => *seal = Some(Seal::new(*key, link, signing.clock, *last)),
@@ -237,7 +231,7 @@ mod tests {
     #[test]
     fn a_key_is_left_until_it_and_its_times_are_in_the_mailbox() {
         let mut flash = Flash::blank();
-        let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
+        let (mut mailbox, status) = (Mailbox::new(), StoreStatus::default());
         let (items_in, items_out) = mailbox.split();
         let mut store_writer = StoreWriter::mount(&mut flash, items_out, &status);
         let mut monitor = Box::new(Monitor::new(Params::defaults()));
@@ -258,7 +252,7 @@ mod tests {
     #[test]
     fn signed_changes_all_day_leave_what_a_landing_needs_of_the_store() {
         let mut flash = Flash::blank();
-        let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
+        let (mut mailbox, status) = (Mailbox::new(), StoreStatus::default());
         let (items_in, items_out) = mailbox.split();
         let mut store_writer = StoreWriter::mount(&mut flash, items_out, &status);
         let mut monitor = Box::new(Monitor::new(Params::defaults()));

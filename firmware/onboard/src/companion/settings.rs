@@ -19,8 +19,6 @@ use hums_recorder::CardState;
 
 use super::library::Library;
 use crate::journal::{Arming, Logbook};
-use crate::notices::Notices;
-use crate::queues::SectorsIn;
 use crate::records;
 use crate::shelf::{LogRequest, Reader, RequestedLog, RequestedPart};
 
@@ -79,8 +77,6 @@ impl Settings {
         now: Instant,
         library: &mut Library,
         book: &mut Logbook<'_>,
-        notices: &mut Notices,
-        sectors: &mut SectorsIn,
         shelf: &mut Reader<'_>,
     ) {
         let reading = book.card.read();
@@ -98,13 +94,13 @@ impl Settings {
                 *self = Self { state: State::Reading(0), ..Self::new() };
             }
             (State::Reading(offset), Arming::Disarmed) => {
-                if !self.read_on(now, offset, library, book, sectors, shelf) {
+                if !self.read_on(now, offset, library, book, shelf) {
                     return;
                 }
                 self.state = done;
                 if self.refused > 0 {
                     let text = "HUMS: PARAMS.TXT: lines refused, correct them";
-                    notices.note(now, 4, text, &mut book.journal, sectors);
+                    book.note(now, 4, text);
                 }
             }
         }
@@ -116,7 +112,6 @@ impl Settings {
         offset: u32,
         library: &mut Library,
         book: &mut Logbook<'_>,
-        sectors: &mut SectorsIn,
         shelf: &mut Reader<'_>,
     ) -> bool {
         let Some(ticket) = self.ticket else {
@@ -135,7 +130,7 @@ impl Settings {
         self.ticket = None;
         for byte in piece {
             if self.take(*byte) {
-                self.line(now, book, sectors);
+                self.line(now, book);
             }
         }
         let count = piece.len() as u32;
@@ -146,11 +141,11 @@ impl Settings {
             return false;
         }
         self.is_cut |= next != length;
-        self.line(now, book, sectors);
+        self.line(now, book);
         true
     }
 
-    fn line(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
+    fn line(&mut self, now: Instant, book: &mut Logbook<'_>) {
         self.number = self.number.saturating_add(1);
         let (number, is_cut) = (self.number, core::mem::take(&mut self.is_cut));
         let line = core::mem::take(&mut self.line);
@@ -158,15 +153,16 @@ impl Settings {
             _ if is_cut => false,
             Ok(Line::Nothing) => true,
             Ok(Line::Set(name, value)) => match place_of_serial(name) {
-                Some(place) => replace_old(place, value, now, book, sectors),
-                None => param_line::value(value)
-                    .is_some_and(|value| book.set_parameter(now, name, value, (0, 0), sectors)),
+                Some(place) => replace_old(place, value, now, book),
+                None => {
+                    param_line::value(value).is_some_and(|value| book.set_parameter(now, name, value, (0, 0)))
+                }
             },
             Ok(Line::Wrong) | Err(_) => false,
         };
         if !set {
             self.refused = self.refused.saturating_add(1);
-            book.journal.by_hand(now, format_args!("PARAMS.TXT: line {number} is refused"), sectors);
+            book.journal.by_hand(now, format_args!("PARAMS.TXT: line {number} is refused"));
         }
     }
 }
@@ -178,18 +174,12 @@ fn place_of_serial(name: &str) -> Option<usize> {
 
 /// `NEW<OLD` replaces the part with the serial number OLD, which may be empty, by the part NEW. The file is read at each power-on:
 /// if the place has another part by then, the line is over.
-fn replace_old(
-    place: usize,
-    value: &str,
-    now: Instant,
-    book: &mut Logbook<'_>,
-    sectors: &mut SectorsIn,
-) -> bool {
+fn replace_old(place: usize, value: &str, now: Instant, book: &mut Logbook<'_>) -> bool {
     let Some((new, old)) = value.split_once('<').filter(|(new, _)| !new.is_empty()) else { return false };
     // Its kind may stand in a line before.
     book.monitor.describe_component(place);
     let known = book.monitor.components().get(place).map(|part| part.serial);
-    known != Some(Label::new(old)) || records::replace_component(now, place, new, (0, 0), book, sectors)
+    known != Some(Label::new(old)) || records::replace_component(now, place, new, (0, 0), book)
 }
 
 #[cfg(test)]

@@ -1,12 +1,10 @@
 //! Texts about the card's slot: the reason why recording stopped, and its resumption.
 
-use hums_blackbox::record::{Event, Record};
 use hums_core::clock::{Instant, Span};
 use hums_recorder::CardState;
 
-use crate::journal::Journal;
-use crate::notices::{Notice, Notices};
-use crate::queues::SectorsIn;
+use crate::journal::Logbook;
+use crate::notices::Notice;
 
 /// Minimum time between two texts, so that a card that comes and goes does not fill the line.
 const QUIET: Span = Span::from_secs(5);
@@ -28,14 +26,8 @@ impl CardNotices {
     }
 
     /// A good state at the beginning is not reported: the heartbeat has it.
-    pub(super) fn tick(
-        &mut self,
-        now: Instant,
-        state: CardState,
-        journal: &mut Journal<'_>,
-        notices: &mut Notices,
-        sectors: &mut SectorsIn,
-    ) {
+    pub(super) fn tick(&mut self, now: Instant, book: &mut Logbook<'_>) {
+        let state = book.card.read().state;
         if state == self.told || self.told_at.is_some_and(|at| now.since(at) < QUIET) {
             return;
         }
@@ -43,11 +35,11 @@ impl CardNotices {
         let is_first = self.told == CardState::Unknown && state == CardState::Recording;
         *self = Self { told: state, told_at: Some(now).filter(|_| !is_first) };
         let number = if state == CardState::Recording { CARD_IN } else { CARD_OUT };
-        journal.record(now, &Record::Event(Event { number, text }), sectors);
+        book.journal.event(now, number, text);
         if !is_first {
             let severity = if state == CardState::Recording { NOTICE } else { WARNING };
             // With a full queue the finding still reports that recording stopped.
-            notices.push(Notice::Text(severity, text));
+            book.notices.push(Notice::Text(severity, text));
         }
     }
 }
@@ -76,9 +68,24 @@ mod tests {
 
     use super::*;
 
+    const STATES: [CardState; 12] = [
+        CardState::Unknown,
+        CardState::Recording,
+        CardState::Absent,
+        CardState::Foreign,
+        CardState::Full,
+        CardState::Failing,
+        CardState::Finished,
+        CardState::Locked,
+        CardState::ExFat,
+        CardState::Unpartitioned,
+        CardState::Damaged,
+        CardState::Formatting,
+    ];
+
     #[test]
     fn every_text_is_one_message() {
-        for text in (0..=u8::MAX).filter_map(|number| words(CardState::from_number(number))) {
+        for text in STATES.into_iter().filter_map(words) {
             assert!(text.len() <= TEXT_BYTES_MAX && text.starts_with("HUMS: card: "), "{text}");
         }
     }

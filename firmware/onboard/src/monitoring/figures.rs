@@ -9,11 +9,9 @@ use hums_link::summary::OwnFigures;
 use hums_recorder::status::{CardState, CardStatus};
 
 use crate::companion::Companion;
-use crate::journal::Journal;
+use crate::journal::Logbook;
 use crate::port::{PortReading, PortStatus};
-use crate::queues::{
-    FRAME_QUEUE_BYTES, GS_QUEUE_BYTES, GsIn, SECTOR_QUEUE_BYTES, SECTOR_QUEUE_SECTORS, SectorsIn,
-};
+use crate::queues::{FRAME_QUEUE_BYTES, GS_QUEUE_BYTES, SECTOR_QUEUE_BYTES, SECTOR_QUEUE_SECTORS};
 
 const RATES: Span = Span::from_secs(5);
 
@@ -33,24 +31,12 @@ pub struct Machine {
     pub stack_bytes: u32,
 }
 
-/// 64-bit sums of the port's 32-bit counters.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    bytes: u64,
-    bytes_not_frames: u64,
-    frames: u64,
-    frames_lost: u64,
-}
-
 /// Counts since power-on.
 pub(super) struct Figures<'a> {
     port: &'a PortStatus,
     port_before: PortReading,
-    blind_ms_before: u32,
     card_frames_lost_before: u32,
-    sums: Sums,
     pub(super) machine: Machine,
-    queue_sectors_max: usize,
     rates: Rates,
 }
 
@@ -82,30 +68,26 @@ impl<'a> Figures<'a> {
         Self {
             port,
             port_before: PortReading::default(),
-            blind_ms_before: 0,
             card_frames_lost_before: card.read().frames_lost,
-            sums: Sums::default(),
             machine: Machine::default(),
-            queue_sectors_max: 0,
             rates: Rates::default(),
         }
     }
 
-    /// Figures for the summary stream, in percent, with the worst of the queues and of the card. `bauds` are the
-    /// rates of the autopilot's port and of the ground station's.
-    pub(super) fn own(&mut self, now: Instant, card: &CardStatus, bauds: [u32; 2], gs: &GsIn) -> OwnFigures {
+    /// Figures for the summary stream, in percent, with the worst of the queues and of the card.
+    pub(super) fn own(&mut self, now: Instant, book: &Logbook<'_>, companion: &Companion<'_>) -> OwnFigures {
         let Machine { cpu_permille, stack_bytes_max, stack_bytes, .. } = self.machine;
-        self.rates.count(now, [self.port_before.bytes, gs.bytes() as u32]);
+        self.rates.count(now, [self.port_before.bytes as u32, companion.ways.queues.bytes() as u32]);
         let [from_autopilot, to_gs] = self.rates.a_second;
-        let [autopilot, ground] = bauds;
+        let (ground, autopilot) = companion.bauds();
         OwnFigures {
             cpu_percent: f32::from(cpu_permille) / 10.0,
             stack_percent: 100.0 * stack_bytes_max as f32 / stack_bytes.max(1) as f32,
-            queue_percent: 100.0 * self.queue_sectors_max as f32 / SECTOR_QUEUE_SECTORS as f32,
-            stall_s: card.read().stall_ms_max as f32 / 1_000.0,
+            queue_percent: 100.0 * book.journal.sectors().deepest() as f32 / SECTOR_QUEUE_SECTORS as f32,
+            stall_s: book.card.read().stall_ms_max as f32 / 1_000.0,
             computer: ComputerStatus {
                 cpu_percent: cpu_permille.div_ceil(10).min(100) as u8,
-                storage_mib: card.read().storage_mib,
+                storage_mib: book.card.read().storage_mib,
                 links: [
                     LinkStatus { baud: autopilot, tx: None, rx: Some(from_autopilot) },
                     LinkStatus { baud: ground, tx: Some(to_gs), rx: None },
@@ -114,30 +96,25 @@ impl<'a> Figures<'a> {
         }
     }
 
-    pub(super) fn stats(
-        &self,
-        card: &CardStatus,
-        journal: &Journal<'_>,
-        companion: &Companion,
-        gs: &GsIn,
-    ) -> Stats {
-        let card = card.read();
+    pub(super) fn stats(&self, book: &Logbook<'_>, companion: &Companion<'_>) -> Stats {
+        let Logbook { journal, card, .. } = book;
+        let (card, port, gs) = (card.read(), self.port.read(), &companion.ways.queues);
         let counters = journal.counters();
         let card_lost = u64::from(card.frames_lost);
         Stats {
-            frames_in: self.sums.frames,
+            frames_in: port.frames,
             frames_logged: counters.frames.saturating_sub(card_lost),
-            frames_lost: self.sums.frames_lost + journal.refused() + card_lost,
-            bytes_in: self.sums.bytes,
-            bytes_not_frames: self.sums.bytes_not_frames,
+            frames_lost: port.frames_lost + journal.refused() + card_lost,
+            bytes_in: port.bytes,
+            bytes_not_frames: port.bytes_not_frames,
             bytes_logged: counters.sectors * SECTOR_BYTES as u64,
             blocks_written: u64::from(card.blocks_written),
-            queue_bytes_max: (self.queue_sectors_max * SECTOR_BYTES) as u64,
+            queue_bytes_max: (journal.sectors().deepest() * SECTOR_BYTES) as u64,
             queue_bytes_capacity: SECTOR_QUEUE_BYTES as u64,
             sd_stall_ms_max: u64::from(card.stall_ms_max),
             gs_frames: gs.frames(),
             gs_bytes: gs.bytes(),
-            frame_queue_bytes_max: u64::from(self.port.queue_bytes_max()),
+            frame_queue_bytes_max: u64::from(port.queue_bytes_max),
             frame_queue_bytes_capacity: FRAME_QUEUE_BYTES as u64,
             gs_queue_bytes_max: u64::from(gs.bytes_max()),
             gs_queue_bytes_capacity: GS_QUEUE_BYTES as u64,
@@ -153,14 +130,8 @@ impl<'a> Figures<'a> {
     }
 
     /// `stopped`: by command.
-    pub(super) fn recorder(
-        &self,
-        now: Instant,
-        stopped: bool,
-        card: &CardStatus,
-        journal: &Journal<'_>,
-        sectors: &SectorsIn,
-    ) -> RecorderStatus {
+    pub(super) fn recorder(&self, now: Instant, stopped: bool, book: &Logbook<'_>) -> RecorderStatus {
+        let Logbook { journal, card, .. } = book;
         let reading = card.read();
         let recording = match reading.state {
             _ if stopped => Recording::Stopped,
@@ -171,8 +142,8 @@ impl<'a> Figures<'a> {
         };
         RecorderStatus {
             recording,
-            queue: sectors.len() as f32 / SECTOR_QUEUE_SECTORS as f32,
-            frames_lost: self.sums.frames_lost + journal.refused() + u64::from(reading.frames_lost),
+            queue: journal.sectors().len() as f32 / SECTOR_QUEUE_SECTORS as f32,
+            frames_lost: self.port_before.frames_lost + journal.refused() + u64::from(reading.frames_lost),
             stall: card.stall(now).into(),
             write_errors: u64::from(reading.write_errors),
             room: reading.room_permille.map(|permille| permille as f32 / 1000.0),
@@ -180,30 +151,18 @@ impl<'a> Figures<'a> {
     }
 
     /// Counts since the last tick; passes losses on.
-    pub(super) fn count(
-        &mut self,
-        now: Instant,
-        card: &CardStatus,
-        journal: &mut Journal<'_>,
-        sectors: &SectorsIn,
-    ) {
+    pub(super) fn count(&mut self, now: Instant, book: &mut Logbook<'_>) {
+        let Logbook { journal, card, .. } = book;
         let port = self.port.read();
-        let new = port.since(self.port_before);
-        self.port_before = port;
-        self.sums.bytes += u64::from(new.bytes);
-        self.sums.bytes_not_frames += u64::from(new.bytes_not_frames);
-        self.sums.frames += u64::from(new.frames);
-        self.sums.frames_lost += u64::from(new.frames_lost);
-        let blind_ms = self.port.blind_ms();
-        let blind = blind_ms.wrapping_sub(core::mem::replace(&mut self.blind_ms_before, blind_ms));
-        let since = Instant::from_millis(now.as_millis().saturating_sub(u64::from(blind)));
-        journal.lose_since(since, now, LossKind::UartOverrun, u64::from(new.overrun));
-        journal.lose(now, LossKind::NotFrames, u64::from(new.bytes_not_frames));
-        journal.lose(now, LossKind::DamagedFrames, u64::from(new.damaged));
-        journal.lose(now, LossKind::QueueFull, u64::from(new.frames_lost));
+        let before = core::mem::replace(&mut self.port_before, port);
+        let blind_ms = port.blind_ms - before.blind_ms;
+        let since = Instant::from_millis(now.as_millis().saturating_sub(blind_ms));
+        journal.lose_since(since, now, LossKind::UartOverrun, port.overrun - before.overrun);
+        journal.lose(now, LossKind::NotFrames, port.bytes_not_frames - before.bytes_not_frames);
+        journal.lose(now, LossKind::DamagedFrames, port.damaged - before.damaged);
+        journal.lose(now, LossKind::QueueFull, port.frames_lost - before.frames_lost);
         let frames_lost = card.read().frames_lost;
         let before = core::mem::replace(&mut self.card_frames_lost_before, frames_lost);
         journal.lose(now, LossKind::Card, u64::from(frames_lost.wrapping_sub(before)));
-        self.queue_sectors_max = self.queue_sectors_max.max(sectors.deepest());
     }
 }

@@ -1,16 +1,13 @@
 //! Events for the record.
 
-use hums_blackbox::record::{
-    Event, LossKind, MarkReason, Moment, Protection, Record, Snapshot, SnapshotValues,
-};
+use hums_blackbox::record::{LossKind, MarkReason, Moment, Protection, Record, Snapshot, SnapshotValues};
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
 use hums_core::mishap::MishapChange;
 
 use super::marks::Marks;
 use crate::journal::Logbook;
-use crate::notices::{self, Notice, Notices};
-use crate::queues::SectorsIn;
+use crate::notices::{self, Notice};
 use crate::records::RecordedState;
 
 /// `MAV_SEVERITY_WARNING`
@@ -23,14 +20,7 @@ pub const CELLS_UNKNOWN: &str = "HUMS: cells not known, set BAT_CELLS";
 pub(super) const CRITICAL: u8 = 8;
 
 #[inline(never)]
-pub(super) fn record(
-    now: Instant,
-    book: &mut Logbook<'_>,
-    recorded: &mut RecordedState,
-    notices: &mut Notices,
-    marks: &mut Marks,
-    sectors: &mut SectorsIn,
-) {
+pub(super) fn record(now: Instant, book: &mut Logbook<'_>, recorded: &mut RecordedState, marks: &mut Marks) {
     while let Some(happening) = book.monitor.take_happening() {
         let (number, text) = match happening {
             Happening::Armed => (1, ""),
@@ -43,24 +33,24 @@ pub(super) fn record(
             Happening::OtherAirframe => (11, "the stored lifetime was another one's"),
             Happening::OtherVehicle => (13, "another system on the port is the vehicle"),
             Happening::Protect(step) => {
-                book.journal.record(now, &Record::Protection(Protection::new(&step)), sectors);
-                notices.announce(Notice::Protection(step));
+                book.journal.record(now, &Record::Protection(Protection::new(&step)));
+                book.notices.announce(Notice::Protection(step));
                 continue;
             }
             Happening::CellsUnknown => {
-                notices.note(now, WARNING, CELLS_UNKNOWN, &mut book.journal, sectors);
+                book.note(now, WARNING, CELLS_UNKNOWN);
                 continue;
             }
             Happening::Mishap(change) => {
-                mishap(now, change, book, notices, marks, sectors);
+                mishap(now, change, book, marks);
                 continue;
             }
         };
-        book.journal.record(now, &Record::Event(Event { number, text }), sectors);
+        book.journal.event(now, number, text);
         match happening {
             Happening::Armed | Happening::TakeOff | Happening::FlightResumed => marks.moves(),
             Happening::Landing => {
-                recorded.usage(now, Moment::End, book, sectors);
+                recorded.usage(now, Moment::End, book);
                 marks.rests(MarkReason::Landed);
             }
             Happening::Disarmed if !book.monitor.flight().airborne() => marks.rests(MarkReason::Disarmed),
@@ -71,34 +61,25 @@ pub(super) fn record(
     journal.lose(now, LossKind::Records, u64::from(monitor.take_happenings_lost()));
     while let Some(snapshot) = monitor.take_snapshot(now.into()) {
         let mut values = SnapshotValues::default();
-        journal.record(now, &Record::Snapshot(Snapshot::new(now, &snapshot, &mut values)), sectors);
+        journal.record(now, &Record::Snapshot(Snapshot::new(now, &snapshot, &mut values)));
     }
 }
 
-fn mishap(
-    now: Instant,
-    change: MishapChange,
-    book: &mut Logbook<'_>,
-    notices: &mut Notices,
-    marks: &mut Marks,
-    sectors: &mut SectorsIn,
-) {
+fn mishap(now: Instant, change: MishapChange, book: &mut Logbook<'_>, marks: &mut Marks) {
     let number = match change {
         MishapChange::Began(_) => 15,
         MishapChange::Down => 16,
         MishapChange::FliesOn | MishapChange::FliesAgain => 17,
         MishapChange::OnBench(kind) => {
-            let event = Event { number: 18, text: kind.name() };
-            book.journal.record(now, &Record::Event(event), sectors);
-            return;
+            return book.journal.event(now, 18, kind.name());
         }
     };
     let report = book.monitor.flight().report(change);
     let text = notices::of_mishap(&report);
-    book.journal.record(now, &Record::Event(Event { number, text: text.as_str() }), sectors);
+    book.journal.event(now, number, text.as_str());
     // The beginning is reported as a finding.
     if !matches!(change, MishapChange::Began(_)) {
-        notices.announce(Notice::Mishap(report));
+        book.notices.announce(Notice::Mishap(report));
     }
     marks.at_once(MarkReason::Mishap);
 }

@@ -5,12 +5,10 @@
 //! written in [`APART`], so that frequent arming and disarming makes less than a kilobyte a minute. A mishap's mark
 //! does not wait.
 
-use hums_blackbox::SectorSink as _;
 use hums_blackbox::record::MarkReason;
 use hums_core::clock::{Instant, Span};
 
 use crate::journal::Journal;
-use crate::queues::SectorsIn;
 
 /// Minimum time between two marks. An earlier one waits, and is dropped if the vehicle moves meanwhile.
 const APART: Span = Span::from_secs(1);
@@ -42,16 +40,16 @@ impl Marks {
     }
 
     /// The mark after all other records of the moment; gives its sector to storage.
-    pub(super) fn tick(&mut self, now: Instant, journal: &mut Journal<'_>, sectors: &mut SectorsIn) {
+    pub(super) fn tick(&mut self, now: Instant, journal: &mut Journal<'_>) {
         if let Some(why) = self.due
             && self.at.is_none_or(|at| now.since(at) >= APART)
-            && journal.mark(now, why, sectors)
+            && journal.mark(now, why)
         {
             *self = Self { due: None, at: Some(now), unsent: true };
         }
-        if self.unsent && sectors.with_reserve(|sink| sink.room()) > 0 {
+        if self.unsent && journal.has_room() {
             self.unsent = false;
-            journal.partial(sectors);
+            journal.partial();
         }
     }
 }

@@ -10,7 +10,7 @@ mod marks;
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_blackbox::Writer;
-use hums_blackbox::record::{Boot, Event, Fault, FindingRecord, Moment, Note, Record, Stats};
+use hums_blackbox::record::{Boot, Fault, FindingRecord, Moment, Note, Record, Stats};
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{Finding, Level};
 use hums_core::observation::Observation;
@@ -20,7 +20,6 @@ use hums_link::frame::{Check, Frame};
 use hums_link::ids;
 use hums_link::request::Port;
 use hums_link::sequence::Sequences;
-use hums_link::summary::Summary;
 use hums_recorder::status::CardStatus;
 
 use crate::ResetCause;
@@ -29,7 +28,7 @@ use crate::journal::{Journal, Logbook};
 use crate::notices::{Notice, Notices};
 use crate::persist::{Handover, StoreWriter};
 use crate::port::PortStatus;
-use crate::queues::{FramesOut, GsIn, SectorsIn, SummaryRoute, UplinkOut};
+use crate::queues::{FramesOut, MonitorEnds, SummaryRoute, UplinkOut};
 use crate::records::RecordedState;
 use crate::supervisor::Task;
 use card_notices::CardNotices;
@@ -68,13 +67,11 @@ pub enum Step {
 /// The pipeline between the frame queue and the queues of sectors and of GS frames.
 pub struct Monitoring<'a> {
     book: Logbook<'a>,
-    summary: Summary,
-    companion: Companion,
+    companion: Companion<'a>,
     sequences: Sequences,
     long_texts: LongTexts,
     identity: Boot<'a>,
     recorded: RecordedState,
-    notices: Notices,
     card_notices: CardNotices,
     files: u32,
     figures: Figures<'a>,
@@ -92,16 +89,17 @@ impl<'a> Monitoring<'a> {
         cause: ResetCause,
         card: &'a CardStatus,
         port: &'a PortStatus,
+        MonitorEnds { sectors, gs }: MonitorEnds<'a>,
     ) -> Self {
+        let companion = Companion::new(monitor.params(), gs);
+        let (journal, notices) = (Journal::new(writer, sectors), Notices::new());
         Self {
-            summary: Summary::new(monitor.params()),
-            companion: Companion::new(monitor.params()),
-            book: Logbook { monitor, journal: Journal::new(writer), card, cause },
+            companion,
+            book: Logbook { monitor, journal, notices, card, cause },
             sequences: Sequences::new(),
             long_texts: LongTexts::new(),
             identity,
             recorded: RecordedState::new(),
-            notices: Notices::new(),
             card_notices: CardNotices::new(),
             files: 0,
             figures: Figures::new(port, card),
@@ -112,89 +110,74 @@ impl<'a> Monitoring<'a> {
     }
 
     /// The recorder's identity, and every parameter that is not at its default.
-    pub fn start(&mut self, now: Instant, sectors: &mut SectorsIn) {
-        self.recorded.heading(now, &self.identity, &mut self.book, sectors);
-        self.recorded.usage(now, Moment::Start, &mut self.book, sectors);
+    pub fn start(&mut self, now: Instant) {
+        self.recorded.heading(now, &self.identity, &mut self.book);
+        self.recorded.usage(now, Moment::Start, &mut self.book);
     }
 
-    fn head_file(&mut self, now: Instant, sectors: &mut SectorsIn) {
+    fn head_file(&mut self, now: Instant) {
         let Self { book, recorded, identity, files, .. } = self;
         let before = core::mem::replace(files, book.card.read().segments);
         if before != 0 && before != *files {
-            recorded.heading(now, identity, book, sectors);
-            recorded.usage_anew(now, book, sectors);
+            recorded.heading(now, identity, book);
+            recorded.usage_anew(now, book);
         }
     }
 
     #[inline(never)]
-    fn tell_before(&mut self, now: Instant, sectors: &mut SectorsIn) {
+    fn tell_before(&mut self, now: Instant) {
         let Some(before) = self.book.card.take_before() else { return };
         self.identity.before = before;
-        self.book.journal.record(now, &Record::Boot(self.identity), sectors);
+        self.book.journal.record(now, &Record::Boot(self.identity));
     }
 
     /// Records the end of the previous boot, with a note on the time before it. Tells the ground station as soon as
     /// the vehicle is known. To be called after [`Self::start`].
-    pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, before: &str, sectors: &mut SectorsIn) {
+    pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, before: &str) {
         let journal = &mut self.book.journal;
-        journal.record(now, &Record::Fault(*fault), sectors);
-        journal.record(now, &Record::Note(Note { severity: FAULT_SEVERITY, text: before }), sectors);
+        journal.record(now, &Record::Fault(*fault));
+        journal.record(now, &Record::Note(Note { severity: FAULT_SEVERITY, text: before }));
         let task = Task::ALL.into_iter().map(Task::name).find(|name| *name == fault.task);
-        self.notices.push(Notice::Restarted(restart_words(fault), task));
+        self.book.notices.push(Notice::Restarted(restart_words(fault), task));
     }
 
     /// Records a text of ours, and sends it to the ground station; `severity` is a `MAV_SEVERITY`.
-    pub fn note(&mut self, now: Instant, severity: u8, text: &'static str, sectors: &mut SectorsIn) {
-        self.notices.note(now, severity, text, &mut self.book.journal, sectors);
+    pub fn note(&mut self, now: Instant, severity: u8, text: &'static str) {
+        self.book.note(now, severity, text);
     }
 
     /// Takes one frame from the queue through the pipeline; `false` if there is none.
-    pub fn drain(&mut self, frames: &mut FramesOut, sectors: &mut SectorsIn, gs: &mut GsIn) -> bool {
-        self.drain_in_steps(frames, sectors, gs, &mut |_| {})
+    pub fn drain(&mut self, frames: &mut FramesOut) -> bool {
+        self.drain_in_steps(frames, &mut |_| {})
     }
 
     /// As [`Self::drain`], with a call at each step, for measurements.
-    pub fn drain_in_steps(
-        &mut self,
-        frames: &mut FramesOut,
-        sectors: &mut SectorsIn,
-        gs: &mut GsIn,
-        begin: &mut impl FnMut(Step),
-    ) -> bool {
+    pub fn drain_in_steps(&mut self, frames: &mut FramesOut, begin: &mut impl FnMut(Step)) -> bool {
         frames.take(|at_micros, message, bytes| {
-            self.frame(Instant::from_micros(at_micros), message, bytes, sectors, gs, begin);
+            self.frame(Instant::from_micros(at_micros), message, bytes, begin);
         })
     }
 
-    fn frame(
-        &mut self,
-        at: Instant,
-        message: Option<u16>,
-        bytes: &[u8],
-        sectors: &mut SectorsIn,
-        gs: &mut GsIn,
-        begin: &mut impl FnMut(Step),
-    ) {
-        let Self { book, summary, companion, .. } = self;
+    fn frame(&mut self, at: Instant, message: Option<u16>, bytes: &[u8], begin: &mut impl FnMut(Step)) {
+        let Self { book, companion, .. } = self;
         let frame = Frame::from_queue(bytes, message);
         begin(Step::Encode { at, id: frame.as_ref().map_or(0, Frame::id) });
         if let Some(frame) = frame.filter(|frame| frame.id() == ids::SETUP_SIGNING) {
-            companion.withhold(at, &frame, &mut book.journal, sectors);
+            companion.withhold(at, &frame, &mut book.journal);
         } else if !companion.stopped() {
-            book.journal.frame(at, bytes, message.is_some(), sectors);
+            book.journal.frame(at, bytes, message.is_some());
         }
         begin(Step::Observe);
         let Some(frame) = frame else { return };
         // A frame that is not verified by its checksum is recorded but not observed.
         if frame.check() == Check::Unverified {
-            companion.pass_down(at, &frame, book, summary, gs);
+            companion.pass_down(at, &frame, book);
             return;
         }
         self.observe(at, &frame);
-        let Self { book, summary, companion, .. } = self;
-        companion.heard(at, &frame, book, summary, sectors, gs);
+        self.companion.heard(at, &frame, &mut self.book);
         begin(Step::Summary);
-        summary.frame(at, &frame, &mut |bytes| companion.forward(at, bytes, gs));
+        self.companion.ways.forward(at, &frame);
     }
 
     #[inline(never)]
@@ -210,86 +193,76 @@ impl<'a> Monitoring<'a> {
     }
 
     /// `false` if there is none.
-    pub fn uplink(
-        &mut self,
-        now: Instant,
-        uplink: &mut UplinkOut,
-        sectors: &mut SectorsIn,
-        gs: &mut GsIn,
-    ) -> bool {
+    pub fn uplink(&mut self, now: Instant, uplink: &mut UplinkOut) -> bool {
         uplink.take(|number, message, bytes| {
+            let Self { book, companion, identity, .. } = self;
             let Some(port) = Port::ALL.get(number as usize).copied() else { return };
             // If the autopilot carries our stream, the radio's port has no user.
-            if port == Port::Gs && gs.route() == SummaryRoute::Autopilot {
+            if port == Port::Gs && companion.ways.queues.route() == SummaryRoute::Autopilot {
                 return;
             }
-            let Self { book, summary, companion, identity, .. } = self;
             if let Some(frame) = Frame::from_queue(bytes, message) {
-                companion.uplink(now, (port, &frame), book, summary, sectors, gs);
+                companion.uplink(now, (port, &frame), book);
             }
-            companion.answer(now, book.monitor, identity, summary, gs);
+            companion.answer(now, book.monitor, identity);
         })
     }
 
     /// Every [`TICK`]; findings are recorded, sent, and given to `findings`.
-    pub fn tick(
-        &mut self,
-        now: Instant,
-        sectors: &mut SectorsIn,
-        gs: &mut GsIn,
-        findings: &mut impl FnMut(&Finding),
-    ) {
+    pub fn tick(&mut self, now: Instant, findings: &mut impl FnMut(&Finding)) {
         let Logbook { journal, card, .. } = &mut self.book;
-        if card.take_group_wanted() && !journal.writer().restart(sectors) {
+        if card.take_group_wanted() && !journal.restart() {
             card.want_group();
         }
-        self.tell_before(now, sectors);
-        self.head_file(now, sectors);
-        let Self { book, figures, card_notices, notices, .. } = self;
-        figures.count(now, book.card, &mut book.journal, sectors);
-        card_notices.tick(now, book.card.read().state, &mut book.journal, notices, sectors);
-        self.check(now, sectors, gs, findings);
-        let Self { book, recorded, notices, marks, .. } = self;
-        happenings::record(now, book, recorded, notices, marks, sectors);
-        recorded.vehicle(now, book, sectors);
-        recorded.clock(now, book, sectors);
-        book.journal.record_losses(now, false, sectors);
+        self.tell_before(now);
+        self.head_file(now);
+        self.figures.count(now, &mut self.book);
+        self.card_notices.tick(now, &mut self.book);
+        self.check(now, findings);
+        let Self { book, recorded, marks, .. } = self;
+        happenings::record(now, book, recorded, marks);
+        recorded.vehicle(now, book);
+        recorded.clock(now, book);
+        book.journal.record_losses(now, false);
         if now.since(self.stats_at) >= STATS {
             self.stats_at = now;
-            self.record_stats(now, sectors, gs);
+            self.record_stats(now);
         }
         if now.since(self.recorded.usage_at()) >= USAGE {
-            self.recorded.usage(now, Moment::Periodic, &mut self.book, sectors);
+            self.recorded.usage(now, Moment::Periodic, &mut self.book);
         }
-        self.marks.tick(now, &mut self.book.journal, sectors);
+        self.marks.tick(now, &mut self.book.journal);
         // Unless full sectors keep storage busy anyway.
-        if now.since(self.partial_at) >= PARTIAL && sectors.is_empty() {
+        if now.since(self.partial_at) >= PARTIAL && self.book.journal.sectors().is_empty() {
             self.partial_at = now;
-            self.book.journal.partial(sectors);
+            self.book.journal.partial();
         }
-        self.talk(now, sectors, gs);
+        self.talk(now);
     }
 
     #[inline(never)]
-    fn talk(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &mut GsIn) {
-        let Self { book, summary, companion, notices, figures, identity, .. } = self;
-        let is_known = book.monitor.vehicle().source.is_some();
-        notices.tell(now, is_known, &mut summary.outlet, &mut |bytes| companion.tell(now, bytes, gs));
-        summary.own = figures.own(now, book.card, [companion.baud(), summary.outlet.baud()], gs);
-        summary.tick(now, book.monitor, &mut |bytes| companion.tell(now, bytes, gs));
-        companion.converse(now, book, summary, notices, sectors, gs);
-        companion.answer(now, book.monitor, identity, summary, gs);
+    fn talk(&mut self, now: Instant) {
+        let Self { book, companion, figures, identity, .. } = self;
+        let own = figures.own(now, book, companion);
+        companion.ways.summarise(now, |summary, mut tell| {
+            let is_known = book.monitor.vehicle().source.is_some();
+            book.notices.tell(now, is_known, &mut summary.outlet, &mut tell);
+            summary.own = own;
+            summary.tick(now, book.monitor, &mut tell);
+        });
+        companion.converse(now, book);
+        companion.answer(now, book.monitor, identity);
     }
 
     /// Ends the record in order: all open data is written. The queues then hold the data that storage must write
     /// before a power-off.
-    pub fn finish(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &GsIn) {
+    pub fn finish(&mut self, now: Instant) {
         let Self { book, figures, recorded, .. } = self;
-        figures.count(now, book.card, &mut book.journal, sectors);
-        book.journal.record_losses(now, true, sectors);
-        recorded.usage(now, Moment::End, book, sectors);
-        self.record_stats(now, sectors, gs);
-        sectors.with_reserve(|sink| self.book.journal.writer().finish(sink));
+        figures.count(now, book);
+        book.journal.record_losses(now, true);
+        recorded.usage(now, Moment::End, book);
+        self.record_stats(now);
+        self.book.journal.finish();
     }
 
     /// Whether a station wants the card-reader mode. The board then calls [`Self::finish`], and restarts.
@@ -309,7 +282,7 @@ impl<'a> Monitoring<'a> {
 
     /// Ground station's port, autopilot's port, baud.
     pub const fn bauds(&self) -> (u32, u32) {
-        (self.summary.outlet.baud(), self.companion.baud())
+        self.companion.bauds()
     }
 
     /// Recorded with the others, and sent.
@@ -318,8 +291,8 @@ impl<'a> Monitoring<'a> {
     }
 
     /// The pipeline's figures since power-on.
-    pub fn stats(&self, gs: &GsIn) -> Stats {
-        self.figures.stats(self.book.card, &self.book.journal, &self.companion, gs)
+    pub fn stats(&self) -> Stats {
+        self.figures.stats(&self.book, &self.companion)
     }
 
     /// At power-on, before the first frame is sent.
@@ -329,36 +302,29 @@ impl<'a> Monitoring<'a> {
 
     /// Hands over items of the signing key at every tick and at the end; whether none is left.
     pub fn save_signing(&mut self, now: Instant, handover: &mut Handover<'_>) -> bool {
-        self.companion.save(now, &self.summary, handover)
+        self.companion.save(now, handover)
     }
 
     #[inline(never)]
-    fn check(
-        &mut self,
-        now: Instant,
-        sectors: &mut SectorsIn,
-        gs: &mut GsIn,
-        findings: &mut impl FnMut(&Finding),
-    ) {
-        let Self { book, summary, companion, sequences, figures, .. } = self;
+    fn check(&mut self, now: Instant, findings: &mut impl FnMut(&Finding)) {
+        let Self { book, companion, sequences, figures, .. } = self;
         let link = sequences.reading(now, book.monitor.vehicle().source);
-        let recorder = figures.recorder(now, companion.stopped(), book.card, &book.journal, sectors);
+        let recorder = figures.recorder(now, companion.stopped(), book);
         let Logbook { monitor, journal, .. } = book;
         monitor.tick(now.into(), &link, &recorder, &mut |finding| {
-            journal.record(now, &Record::Finding(FindingRecord::new(now, finding)), sectors);
+            journal.record(now, &Record::Finding(FindingRecord::new(now, finding)));
             if finding.level == Level::Critical {
-                let event = Event { number: CRITICAL, text: finding.check };
-                journal.record(now, &Record::Event(event), sectors);
+                journal.event(now, CRITICAL, finding.check);
             }
-            summary.finding(now, finding, &mut |bytes| companion.tell(now, bytes, gs));
+            companion.ways.summarise(now, |summary, mut tell| summary.finding(now, finding, &mut tell));
             findings(finding);
         });
     }
 
     #[inline(never)]
-    fn record_stats(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &GsIn) {
-        let stats = Record::Stats(self.stats(gs));
-        self.book.journal.record(now, &stats, sectors);
+    fn record_stats(&mut self, now: Instant) {
+        let stats = Record::Stats(self.stats());
+        self.book.journal.record(now, &stats);
     }
 }
 

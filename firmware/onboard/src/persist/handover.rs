@@ -23,7 +23,7 @@ pub struct Handover<'a> {
     items: MailboxIn<'a>,
     status: &'a StoreStatus,
     told: StoreReading,
-    frames: u32,
+    frames: u64,
     frames_at: Instant,
     /// Armed, flying, or not known to be disarmed.
     active_at: Instant,
@@ -47,7 +47,7 @@ impl<'a> Handover<'a> {
     }
 
     /// At every tick: hands over items that are due. `frames` is reception's counter.
-    pub fn step(&mut self, now: Instant, monitor: &mut Monitor, frames: u32) {
+    pub fn step(&mut self, now: Instant, monitor: &mut Monitor, frames: u64) {
         if self.frames != frames {
             (self.frames, self.frames_at) = (frames, now);
         }
@@ -55,13 +55,14 @@ impl<'a> Handover<'a> {
         if !disarmed || monitor.flight().airborne() {
             self.active_at = now;
         }
-        self.status.set_calm(if disarmed && now.since(self.frames_at) >= QUIET {
+        let calm = if disarmed && now.since(self.frames_at) >= QUIET {
             EraseMoment::Silent
         } else if now.since(self.active_at) >= GROUNDED {
             EraseMoment::Grounded
         } else {
             EraseMoment::None
-        });
+        };
+        self.status.change(|store| store.calm = calm);
         self.put_params(monitor.params_mut());
         self.put_items(now, monitor);
     }

@@ -16,12 +16,6 @@ struct Item {
 /// The item on its way into the store. While it waits, all others stay with their owners.
 pub struct Mailbox(Ring<Item, 1>);
 
-impl Default for Mailbox {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Mailbox {
     /// Empty.
     pub const fn new() -> Self {

@@ -8,7 +8,7 @@ use hums_core::parameters::ParamError;
 use hums_store::{Error, Key, Store, StoreCondition, param};
 
 use super::mailbox::MailboxOut;
-use super::status::{EraseMoment, StoreState, StoreStatus, count};
+use super::status::{EraseMoment, StoreState, StoreStatus};
 
 const AHEAD: (usize, usize) = (5, 8);
 /// A sector with a smaller free part is erased on the ground even while the autopilot talks.
@@ -50,13 +50,13 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
             Err(_) => (None, StoreState::Failed),
             Ok((store, StoreCondition::Kept)) => (Some(store), StoreState::Kept),
             Ok((store, StoreCondition::Damaged)) => {
-                count(&status.unreadable);
+                status.change(|store| store.unreadable += 1);
                 (Some(store), StoreState::Kept)
             }
             Ok((store, StoreCondition::Blank)) => (Some(store), StoreState::New),
             Ok((store, StoreCondition::Unreadable)) => (Some(store), StoreState::Remade),
         };
-        status.set_state(state);
+        status.change(|store| store.state = state);
         Self { store, items, status, waits: false, turned: false, scarce: false }
     }
 
@@ -66,7 +66,7 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         let Some(store) = &mut self.store else { return false };
         let turned = store.turn_ahead(F::ERASE_SIZE * AHEAD.0 / AHEAD.1);
         if turned.is_err() {
-            count(&self.status.failed);
+            self.status.change(|store| store.failed += 1);
         }
         self.look_for_room();
         turned.unwrap_or(false)
@@ -79,17 +79,17 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         let Self { store: Some(store), status, .. } = self else { return };
         let outcome = store.for_each(|key, value| {
             if key != SESSION && !restore(monitor, key, value) {
-                count(&status.unreadable);
+                status.change(|store| store.unreadable += 1);
             }
         });
         if outcome.is_err() {
-            count(&status.unreadable);
+            status.change(|store| store.unreadable += 1);
         }
         let mut session = [0; ITEM_BYTES_MAX];
         match store.get(SESSION, &mut session) {
             Ok(None) => {}
             Ok(Some(length)) if restore(monitor, SESSION, session.get(..length).unwrap_or_default()) => {}
-            Ok(Some(_)) | Err(_) => count(&status.unreadable),
+            Ok(Some(_)) | Err(_) => status.change(|store| store.unreadable += 1),
         }
         self.look_for_room();
     }
@@ -107,14 +107,14 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
 
     /// Saves one item. An erase is allowed by [`EraseMoment`] (the table in [`super`]), or by `may_erase`.
     pub fn service(&mut self, may_erase: bool) -> SaveStep {
-        let calm = self.status.calm();
+        let calm = self.status.read().calm;
         let erases = calm == EraseMoment::Silent || (calm == EraseMoment::Grounded && self.scarce);
         self.turned &= calm != EraseMoment::None;
         if erases && !self.turned {
             // Before the first save: the next flight then has room, and a save needs no erase of its own.
             self.turned = true;
             if self.turn_ahead() && calm == EraseMoment::Grounded {
-                count(&self.status.erased);
+                self.status.change(|store| store.erased += 1);
             }
         }
         let Self { store, items, status, waits, .. } = self;
@@ -131,13 +131,13 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         store.allow_erase(false);
         if matches!(saved, Err(Error::NotNow)) {
             if !core::mem::replace(waits, true) {
-                count(&status.refused);
+                status.change(|store| store.refused += 1);
             }
             return SaveStep::Waits;
         }
         *waits = false;
         // After two failures its owner saves it again when it has changed.
-        count(if saved.is_ok() { &status.saved } else { &status.failed });
+        status.change(|store| if saved.is_ok() { store.saved += 1 } else { store.failed += 1 });
         items.release();
         self.look_for_room();
         SaveStep::Took
@@ -148,7 +148,8 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         if let Some(store) = &self.store {
             let room = store.room();
             self.scarce = room < F::ERASE_SIZE * SCARCE.0 / SCARCE.1;
-            self.status.set_room(if room < RESERVE { Room::Reserve } else { Room::Enough });
+            let room = if room < RESERVE { Room::Reserve } else { Room::Enough };
+            self.status.change(|store| store.room = room);
         }
     }
 }

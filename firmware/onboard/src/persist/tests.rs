@@ -22,7 +22,7 @@ use hums_store::{Key, Store, param_value};
 type Flash = SimFlash<16384>;
 
 fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut StoreWriter<&mut Flash>)) {
-    let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
+    let (mut mailbox, status) = (Mailbox::new(), StoreStatus::default());
     let (items_in, items_out) = mailbox.split();
     let mut monitor = Box::new(Monitor::new(Params::defaults()));
     let mut store_writer = StoreWriter::mount(flash, items_out, &status);
@@ -131,7 +131,7 @@ fn a_save_that_needs_an_erase_waits_is_told_once_and_is_done_when_it_may() {
     });
 }
 
-fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover, frames: u32) {
+fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover, frames: u64) {
     let now = Instant::from_millis(second * 1_000);
     let source = Source { system: 1, component: 1 };
     let heartbeat = Heartbeat { armed: flies, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
@@ -155,7 +155,7 @@ fn fly(flash: &mut Flash, seconds: u64) -> Vec<u64> {
     session(flash, |monitor, handover, store_writer| {
         let before = monitor.lifetime().totals.raw(UsageCounter::Flight);
         for second in 0..seconds {
-            live(second, (20..seconds - 5).contains(&second), monitor, handover, second as u32);
+            live(second, (20..seconds - 5).contains(&second), monitor, handover, second);
             while store_writer.service(false) == SaveStep::Took {}
             assert_eq!(store_writer.status.read().refused, 0, "nothing waits for an erase");
             copies.push((second, before, store_writer.status.read().saved));
@@ -203,13 +203,13 @@ fn between_two_flights_room_is_made_for_the_next_one() {
         let mut second = 0;
         for flight in 0..6 {
             for _ in 0..3_600 {
-                live(second, true, monitor, handover, second as u32);
+                live(second, true, monitor, handover, second);
                 while store_writer.service(false) == SaveStep::Took {}
                 second += 1;
             }
             assert_eq!(store_writer.status.read().refused, 0, "flight {flight}");
             for _ in 0..20 {
-                live(second, false, monitor, handover, u32::MAX);
+                live(second, false, monitor, handover, u64::MAX);
                 while store_writer.service(false) == SaveStep::Took {}
                 second += 1;
             }
@@ -226,7 +226,7 @@ fn a_board_that_stays_on_beside_an_autopilot_that_never_falls_silent_keeps_its_c
     session(&mut flash, |monitor, handover, store_writer| {
         for second in 0..12 * 3_600_u64 {
             let flies = (600..1_200).contains(&(second % 3_600));
-            live(second, flies, monitor, handover, second as u32);
+            live(second, flies, monitor, handover, second);
             if second % 120 == 0 {
                 handover.put(Key::item(33), &second.to_le_bytes().repeat(3));
             }
@@ -254,21 +254,21 @@ fn on_the_ground_nothing_is_erased_while_there_is_room_or_the_vehicle_was_just_d
     let mut flash = Flash::blank();
     session(&mut flash, |monitor, handover, store_writer| {
         for second in 0..3_600 {
-            live(second, false, monitor, handover, second as u32);
+            live(second, false, monitor, handover, second);
             while store_writer.service(false) == SaveStep::Took {}
         }
         assert_eq!(
-            (store_writer.status.read().erased, store_writer.status.calm()),
+            (store_writer.status.read().erased, store_writer.status.read().calm),
             (0, EraseMoment::Grounded)
         );
         for (second, calm) in
             [(3_600, EraseMoment::None), (3_601, EraseMoment::None), (3_620, EraseMoment::Grounded)]
         {
-            live(second, second == 3_600, monitor, handover, second as u32);
-            assert_eq!(store_writer.status.calm(), calm, "at {second} s");
+            live(second, second == 3_600, monitor, handover, second);
+            assert_eq!(store_writer.status.read().calm, calm, "at {second} s");
         }
         live(3_626, false, monitor, handover, 3_620);
-        assert_eq!(store_writer.status.calm(), EraseMoment::Silent);
+        assert_eq!(store_writer.status.read().calm, EraseMoment::Silent);
     });
 }
 
@@ -304,7 +304,7 @@ fn an_item_that_makes_no_sense_is_told_and_the_others_are_read() {
 
 #[test]
 fn without_a_store_all_goes_on_and_it_is_told() {
-    let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
+    let (mut mailbox, status) = (Mailbox::new(), StoreStatus::default());
     let (items_in, items_out) = mailbox.split();
     let mut monitor = Box::new(Monitor::new(Params::defaults()));
     let mut flash = Flash::blank();

@@ -31,14 +31,14 @@ impl<const BYTES: usize> FramesIn<'_, BYTES> {
         grant[8..STAMP_BYTES].copy_from_slice(&frame.message().unwrap_or(UNKNOWN).to_le_bytes());
         grant[STAMP_BYTES..len].copy_from_slice(bytes);
         // Before the reader can take it out.
-        self.1.rise(len);
+        self.1.change(|fill| fill.rise(len));
         grant.commit(len as u16);
         true
     }
 
     /// The most bytes that waited at once.
     pub fn bytes_max(&self) -> u32 {
-        self.1.max()
+        self.1.read().bytes_max as u32
     }
 }
 
@@ -60,7 +60,7 @@ impl<const BYTES: usize> FramesOut<'_, BYTES> {
             let message = Some(u16::from_le_bytes(*message)).filter(|message| *message != UNKNOWN);
             take(u64::from_le_bytes(*stamp), message, frame);
         }
-        self.1.fall(grant.len());
+        self.1.change(|fill| fill.fall(grant.len()));
         grant.release();
         true
     }

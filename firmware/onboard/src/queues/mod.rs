@@ -5,7 +5,7 @@
 //! | frames | reception | monitor | [`FRAME_QUEUE_BYTES`] | the frame is lost, counted in [`crate::PortStatus`] |
 //! | sectors | monitor | storage | [`SECTOR_QUEUE_SECTORS`] | frames are refused before they are encoded, and counted; [`SECTOR_RESERVE`] stays for records |
 //! | GS | monitor | downlink | [`GS_QUEUE_BYTES`] | the frame is lost, counted; the summary stream repeats what matters |
-//! | uplink | uplink, USB | monitor | [`UPLINK_QUEUE_BYTES`] | the frame is lost, counted; whoever asks at a port for ground stations must ask again |
+//! | uplink | uplink, USB | monitor | [`UPLINK_QUEUE_BYTES`] | the frame is lost; whoever asks at a port for ground stations must ask again |
 //! | USB | monitor | USB | [`USB_QUEUE_BYTES`] | answers wait; a frame of the summary stream is lost, counted |
 //! | autopilot | monitor | requests | [`AUTOPILOT_QUEUE_BYTES`] | the frame is lost, counted; requests are repeated |
 
@@ -25,7 +25,7 @@ pub use capacities::{
     SECTOR_RESERVE, UPLINK_QUEUE_BYTES, USB_QUEUE_BYTES,
 };
 pub use frames::{FramesIn, FramesOut, UplinkIn, UplinkOut};
-use level::Level;
+use level::{Fill, Level};
 pub use ports::{AutopilotOut, GsIn, GsOut, PortIn, PortOut, SummaryRoute, UsbOut};
 use sectors::SectorQueue;
 pub use sectors::{SectorsIn, SectorsOut};
@@ -51,18 +51,22 @@ pub struct Queues {
     levels: [Level; 5],
 }
 
-/// Ends by task.
+/// Queue ends of the monitor.
+pub struct MonitorEnds<'a> {
+    /// To storage.
+    pub sectors: SectorsIn<'a>,
+    /// To the ports.
+    pub gs: GsIn<'a>,
+}
+
+/// All other ends, by task.
 pub struct Ends<'a> {
     /// For reception.
     pub frames_in: FramesIn<'a>,
     /// For the monitor.
     pub frames_out: FramesOut<'a>,
-    /// For the monitor.
-    pub sectors_in: SectorsIn<'a>,
     /// For storage.
     pub sectors_out: SectorsOut<'a>,
-    /// For the monitor.
-    pub gs_in: GsIn<'a>,
     /// For the downlink.
     pub gs_out: GsOut<'a>,
     /// For the uplink.
@@ -77,12 +81,6 @@ pub struct Ends<'a> {
     pub usb_out: UsbOut<'a>,
 }
 
-impl Default for Queues {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Queues {
     /// Empty queues.
     pub const fn new() -> Self {
@@ -94,34 +92,34 @@ impl Queues {
             usb: Churrasco::new(),
             sectors: sectors::sector_queue(),
             shelf: Shelf::new(),
-            levels: [const { Level::new() }; 5],
+            levels: [const { Level::new(Fill::EMPTY) }; 5],
         }
     }
 
     /// Hands out the ends, once.
-    pub fn split(&mut self) -> Ends<'_> {
-        let (sectors_in, sectors_out) = sectors::split(&mut self.sectors, SECTOR_RESERVE);
+    pub fn split(&mut self) -> (MonitorEnds<'_>, Ends<'_>) {
+        let (sectors, sectors_out) = sectors::split(&mut self.sectors, SECTOR_RESERVE);
         let (reader, shelf) = self.shelf.split();
         let [frames, gs, uplink, autopilot, usb] = &self.levels;
-        Ends {
+        let gs_in = GsIn {
+            gs: PortIn::new(self.gs.framed_producer(), gs),
+            autopilot: PortIn::new(self.autopilot.framed_producer(), autopilot),
+            usb: PortIn::new(self.usb.framed_producer(), usb),
+            shelf: reader,
+            route: SummaryRoute::Port,
+        };
+        let others = Ends {
             frames_in: FramesIn(self.frames.framed_producer(), frames),
             frames_out: FramesOut(self.frames.framed_consumer(), frames),
-            sectors_in,
             sectors_out,
-            gs_in: GsIn {
-                gs: PortIn::new(self.gs.framed_producer(), gs),
-                autopilot: PortIn::new(self.autopilot.framed_producer(), autopilot),
-                usb: PortIn::new(self.usb.framed_producer(), usb),
-                shelf: reader,
-                route: SummaryRoute::Port,
-            },
             shelf,
             gs_out: PortOut(self.gs.framed_consumer(), gs),
             uplink_in: FramesIn(self.uplink.framed_producer(), uplink),
             uplink_out: FramesOut(self.uplink.framed_consumer(), uplink),
             autopilot_out: PortOut(self.autopilot.framed_consumer(), autopilot),
             usb_out: PortOut(self.usb.framed_consumer(), usb),
-        }
+        };
+        (MonitorEnds { sectors, gs: gs_in }, others)
     }
 }
 
@@ -153,7 +151,7 @@ mod tests {
     #[test]
     fn a_frame_comes_out_with_the_message_that_it_was_found_to_be() {
         let mut queues = Box::new(Queues::new());
-        let mut ends = queues.split();
+        let (_, mut ends) = queues.split();
         let mut out = [0; FRAME_BYTES_MAX];
         for id in [0, 30, 253] {
             let bytes = Encoder::of(1, 1).frame(&mut out, &Packet::new(id)).to_vec();
@@ -170,7 +168,7 @@ mod tests {
     #[test]
     fn a_full_frame_queue_refuses_and_keeps_what_it_has() {
         let mut queues = Box::new(Queues::new());
-        let mut ends = queues.split();
+        let (_, mut ends) = queues.split();
         let mut taken = 0;
         while put(&ends.frames_in, taken, [taken as u8; 100]) {
             taken += 1;
@@ -189,30 +187,30 @@ mod tests {
     #[test]
     fn how_full_a_queue_was_is_remembered_when_it_is_empty_again() {
         let mut queues = Box::new(Queues::new());
-        let mut ends = queues.split();
+        let (mut monitor, mut ends) = queues.split();
         let mut out = [0; FRAME_BYTES_MAX];
         for frames in [3, 1] {
             for _ in 0..frames {
                 put(&ends.frames_in, 0, [1; 50]);
-                ends.gs_in.put(&[7; 100]);
+                monitor.gs.send(Port::Gs, &[7; 100]);
             }
             while ends.frames_out.take(|_, _, _| {}) && ends.gs_out.take(&mut out).is_some() {}
             assert_eq!(ends.frames_in.bytes_max(), 3 * (2 + 50 + STAMP_BYTES as u32));
-            assert_eq!(ends.gs_in.bytes_max(), 3 * 102);
+            assert_eq!(monitor.gs.bytes_max(), 3 * 102);
         }
     }
 
     #[test]
     fn the_reserve_is_kept_for_records() {
         let mut queues = Box::new(Queues::new());
-        let mut ends = queues.split();
+        let (mut monitor, _) = queues.split();
         let sector = Sector::zeroed();
-        while ends.sectors_in.room() > 0 {
-            ends.sectors_in.put(&sector);
+        while monitor.sectors.room() > 0 {
+            monitor.sectors.put(&sector);
         }
-        assert_eq!(ends.sectors_in.len(), SECTOR_QUEUE_SECTORS - SECTOR_RESERVE);
-        assert_eq!(ends.sectors_in.with_reserve(|sink| sink.room()), SECTOR_RESERVE);
-        assert_eq!(ends.sectors_in.room(), 0);
+        assert_eq!(monitor.sectors.len(), SECTOR_QUEUE_SECTORS - SECTOR_RESERVE);
+        assert_eq!(monitor.sectors.with_reserve(|sink| sink.room()), SECTOR_RESERVE);
+        assert_eq!(monitor.sectors.room(), 0);
     }
 
     #[test]
@@ -220,7 +218,7 @@ mod tests {
         // 921,600 baud, compressed 3.6 times.
         let sectors = (92_160 * 5 / 2 * 10 / 36_usize).div_ceil(SECTOR_BYTES);
         let mut queues = Box::new(Queues::new());
-        let Ends { mut sectors_in, mut sectors_out, .. } = queues.split();
+        let (MonitorEnds { sectors: mut sectors_in, .. }, Ends { mut sectors_out, .. }) = queues.split();
         let sector = Sector::zeroed();
         for _ in 0..ROW_BLOCKS {
             sectors_in.put(&sector);
@@ -242,18 +240,18 @@ mod tests {
         let frame = [7; 92];
         for shift in 0..GS_QUEUE_BYTES {
             let mut queues = Box::new(Queues::new());
-            let Ends { mut gs_in, mut gs_out, .. } = queues.split();
+            let (MonitorEnds { gs: mut gs_in, .. }, Ends { mut gs_out, .. }) = queues.split();
             let mut out = [0; FRAME_BYTES_MAX];
             for len in [shift / 8, shift % 8].into_iter().filter(|len| *len > 0) {
                 for _ in 0..if len == shift / 8 { 8 } else { 1 } {
-                    gs_in.put(&vec![0; len][..]);
+                    gs_in.send(Port::Gs, &vec![0; len][..]);
                     gs_out.take(&mut out);
                 }
             }
-            gs_in.put(&[7; FRAME_BYTES_MAX]);
+            gs_in.send(Port::Gs, &[7; FRAME_BYTES_MAX]);
             let sent = gs_out.lend(async |_| {
                 for _ in 0..waiting / (frame.len() + 2) {
-                    gs_in.put(&frame);
+                    gs_in.send(Port::Gs, &frame);
                 }
                 true
             });
@@ -265,7 +263,7 @@ mod tests {
     #[test]
     fn a_usb_port_takes_frames_while_it_is_open_and_counts_those_that_its_end_drops() {
         let mut queues = Box::new(Queues::new());
-        let Ends { mut gs_in, mut usb_out, .. } = queues.split();
+        let (MonitorEnds { gs: mut gs_in, .. }, Ends { mut usb_out, .. }) = queues.split();
         let mut out = [0; FRAME_BYTES_MAX];
         assert!(gs_in.is_open(Port::Gs) && !gs_in.is_open(Port::Usb) && !gs_in.has_room(Port::Usb, 0));
         for _ in 0..200 {
@@ -290,12 +288,12 @@ mod tests {
     #[test]
     fn a_full_gs_queue_counts_what_it_refuses() {
         let mut queues = Box::new(Queues::new());
-        let mut ends = queues.split();
+        let (mut monitor, mut ends) = queues.split();
         for _ in 0..100 {
-            ends.gs_in.put(&[7; 100]);
+            monitor.gs.send(Port::Gs, &[7; 100]);
         }
-        assert_eq!(ends.gs_in.frames() + ends.gs_in.lost(), 100);
-        assert!(ends.gs_in.lost() > 0);
+        assert_eq!(monitor.gs.frames() + monitor.gs.lost(), 100);
+        assert!(monitor.gs.lost() > 0);
         let mut out = [0; FRAME_BYTES_MAX];
         assert_eq!(ends.gs_out.take(&mut out), Some(100));
     }

@@ -3,13 +3,13 @@
 //! The USB port has no line of its own speed: its queue is its limit, and it is closed while no host takes its bytes.
 
 use bbqueue::nicknames::Churrasco;
-use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
+use bbqueue::prod_cons::framed::{FramedConsumer, FramedGrantR, FramedProducer};
 use hums_link::encode::FRAME_BYTES_MAX;
 
 use hums_link::request::Port;
 
 use super::capacities::{AUTOPILOT_QUEUE_BYTES, GS_QUEUE_BYTES, USB_QUEUE_BYTES};
-use super::level::{HEAD_BYTES, Level};
+use super::level::{Fill, HEAD_BYTES, Level};
 use crate::shelf::Reader;
 
 /// All ports, and the logs on the card.
@@ -35,11 +35,6 @@ pub enum SummaryRoute {
 }
 
 impl GsIn<'_> {
-    /// Queues a frame, or counts it as lost.
-    pub fn put(&mut self, frame: &[u8]) {
-        self.gs.put(frame);
-    }
-
     /// Queues a frame at this port, or counts it as lost.
     pub fn send(&mut self, port: Port, frame: &[u8]) {
         match port {
@@ -60,15 +55,15 @@ impl GsIn<'_> {
 
     /// Whether somebody takes the frames of this port.
     pub fn is_open(&self, port: Port) -> bool {
-        port != Port::Usb || self.usb.level.is_open()
+        port != Port::Usb || self.usb.level.read().is_open
     }
 
     /// Whether a frame of `bytes` has room. The outlets of the other ports know their queues by a model of the line.
     pub fn has_room(&self, port: Port, bytes: usize) -> bool {
         // The end of the queue may be too short for a frame.
         const USABLE: usize = USB_QUEUE_BYTES - (HEAD_BYTES + FRAME_BYTES_MAX);
-        let level = self.usb.level;
-        port != Port::Usb || (level.is_open() && level.bytes() + HEAD_BYTES + bytes <= USABLE)
+        let Fill { is_open, bytes: waiting, .. } = self.usb.level.read();
+        port != Port::Usb || (is_open && waiting + HEAD_BYTES + bytes <= USABLE)
     }
 
     /// Queues a frame of the summary stream.
@@ -107,7 +102,7 @@ impl GsIn<'_> {
 
     /// Most waiting bytes.
     pub fn bytes_max(&self) -> u32 {
-        self.gs.level.max()
+        self.gs.level.read().bytes_max as u32
     }
 }
 
@@ -133,7 +128,7 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
             return;
         };
         grant.copy_from_slice(frame);
-        self.level.rise(frame.len());
+        self.level.change(|fill| fill.rise(frame.len()));
         grant.commit(len);
         self.frames += 1;
         self.bytes += frame.len() as u64;
@@ -146,7 +141,7 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
 
     /// Frames that were not queued, or not sent.
     pub fn lost(&self) -> u64 {
-        self.lost + u64::from(self.level.dropped())
+        self.lost + u64::from(self.level.read().dropped)
     }
 }
 
@@ -162,29 +157,26 @@ pub type UsbOut<'a> = PortOut<'a, USB_QUEUE_BYTES>;
 /// Reading end.
 pub type AutopilotOut<'a> = PortOut<'a, AUTOPILOT_QUEUE_BYTES>;
 
-impl<const BYTES: usize> PortOut<'_, BYTES> {
+impl<'a, const BYTES: usize> PortOut<'a, BYTES> {
     /// Removes it; returns its length, `None` if there is none.
     pub fn take(&mut self, out: &mut [u8; FRAME_BYTES_MAX]) -> Option<usize> {
         let grant = self.0.read().ok()?;
         let len = grant.len().min(out.len());
         out[..len].copy_from_slice(&grant[..len]);
-        self.1.fall(grant.len());
-        grant.release();
+        self.release(grant, true);
         Some(len)
     }
 
     /// A host takes the frames from now on.
     pub fn open(&self) {
-        self.1.set_open(true);
+        self.1.change(|fill| fill.is_open = true);
     }
 
     /// Nobody takes the frames any more: those that wait are dropped and counted.
     pub fn close(&mut self) {
-        self.1.set_open(false);
+        self.1.change(|fill| fill.is_open = false);
         while let Ok(grant) = self.0.read() {
-            self.1.fall(grant.len());
-            self.1.drop_one();
-            grant.release();
+            self.release(grant, false);
         }
     }
 
@@ -193,11 +185,15 @@ impl<const BYTES: usize> PortOut<'_, BYTES> {
     pub async fn lend(&mut self, send: impl AsyncFnOnce(&[u8]) -> bool) -> Option<bool> {
         let grant = self.0.read().ok()?;
         let is_sent = send(&grant).await;
-        if !is_sent {
-            self.1.drop_one();
-        }
-        self.1.fall(grant.len());
-        grant.release();
+        self.release(grant, is_sent);
         Some(is_sent)
+    }
+
+    fn release(&self, frame: FramedGrantR<&'a Churrasco<BYTES>>, is_sent: bool) {
+        self.1.change(|fill| {
+            fill.fall(frame.len());
+            fill.dropped += u32::from(!is_sent);
+        });
+        frame.release();
     }
 }

@@ -135,25 +135,6 @@ impl Server<'_> {
         self.erases.is_some() || self.sum.is_some() || self.wants.len() > 0
     }
 
-    #[cfg(test)]
-    pub(crate) fn serve_text(&mut self, text: &[u8]) {
-        let Some(&mut LogRequest {
-            ticket,
-            which: RequestedLog::Settings,
-            what: RequestedPart::Data(offset),
-        }) = self.wants.waiting().first_mut()
-        else {
-            return;
-        };
-        self.wants.release(1);
-        let data = &text[(offset as usize).min(text.len())..];
-        let data = &data[..data.len().min(DATA_MAX)];
-        let answer = Answer { found: Ok(()), bytes: text.len() as u32, offset, ..Answer::none(ticket) };
-        let place = self.answers.free().expect("room for one answer");
-        *place = (answer, data.iter().copied().collect());
-        self.answers.commit();
-    }
-
     /// Part of a request, if there is room for its answer; whether there was one.
     pub fn serve<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
         if let Some(entry) = self.erases {
@@ -323,4 +304,29 @@ fn copy<D: CardDevice>(
     for_each_part(card, segment, &answer.log, answer.offset..end, |part| {
         let _ = to.extend_from_slice(part);
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    impl Server<'_> {
+        pub(crate) fn serve_text(&mut self, text: &[u8]) {
+            let Some(&mut LogRequest {
+                ticket,
+                which: RequestedLog::Settings,
+                what: RequestedPart::Data(offset),
+            }) = self.wants.waiting().first_mut()
+            else {
+                return;
+            };
+            self.wants.release(1);
+            let data = &text[(offset as usize).min(text.len())..];
+            let data = &data[..data.len().min(DATA_MAX)];
+            let answer = Answer { found: Ok(()), bytes: text.len() as u32, offset, ..Answer::none(ticket) };
+            let place = self.answers.free().expect("room for one answer");
+            *place = (answer, data.iter().copied().collect());
+            self.answers.commit();
+        }
+    }
 }

@@ -76,8 +76,8 @@ impl<'a> Segments<'a> {
         } else {
             self.earlier = card.newest().clone();
             if newest.is_none() {
-                self.status
-                    .set_before(&LastSession { found: PreviousEnd::Nothing, ..LastSession::default() });
+                let found = PreviousEnd::Nothing;
+                self.status.set_before(LastSession { found, ..LastSession::default() });
             }
             let name = next.ok_or(CardError::Full)?;
             let session = mix(mix(volume_id, name.session), self.entropy);
@@ -105,7 +105,7 @@ impl<'a> Segments<'a> {
     pub(super) fn look_before<D: CardDevice>(&mut self, card: &Card<'_, D>) {
         let earlier = core::mem::take(&mut self.earlier);
         if !earlier.is_empty() {
-            self.status.set_before(&before::look(card, &earlier));
+            self.status.set_before(before::look(card, &earlier));
         }
     }
 
@@ -147,8 +147,12 @@ impl<'a> Segments<'a> {
             log.newest_copy = NewestCopy::Further;
         }
         self.is_dated = self.status.is_utc_known();
-        self.status.begin_segment(name.session, overwrote);
-        self.status.set_state(CardState::Recording);
+        self.status.change(|card| {
+            card.session = name.session;
+            card.segments += 1;
+            card.segments_overwritten += u32::from(overwrote);
+            card.state = CardState::Recording;
+        });
         Ok(())
     }
 

@@ -1,25 +1,18 @@
-//! The two checksums of the SD specification (4.5), without tables: the card is slower.
+//! The two checksums of the SD specification (4.5).
 
-/// CRC-7 of a command (x^7 + x^3 + 1), shifted and with the end bit, as its last byte is.
+use ::crc::{CRC_7_MMC, CRC_16_XMODEM, Crc, NoTable};
+
+const COMMAND: Crc<u8, NoTable> = Crc::<u8, NoTable>::new(&CRC_7_MMC);
+static BLOCK: Crc<u16> = Crc::<u16>::new(&CRC_16_XMODEM);
+
+/// CRC-7 of a command, shifted and with the end bit, as its last byte is.
 pub(super) fn crc7(bytes: &[u8]) -> u8 {
-    let mut crc = 0_u8;
-    for byte in bytes {
-        crc ^= byte;
-        for _ in 0..8 {
-            crc = if crc & 0x80 == 0 { crc << 1 } else { (crc << 1) ^ (0x09 << 1) };
-        }
-    }
-    crc | 1
+    COMMAND.checksum(bytes) << 1 | 1
 }
 
-/// CRC-16 of a block (x^16 + x^12 + x^5 + 1).
+/// CRC-16 of a block.
 pub(super) fn crc16(bytes: &[u8]) -> u16 {
-    bytes.iter().fold(0, |crc: u16, byte| {
-        let mut crc = crc.rotate_left(8) ^ u16::from(*byte);
-        crc ^= (crc & 0xFF) >> 4;
-        crc ^= crc << 12;
-        crc ^ (crc & 0xFF) << 5
-    })
+    BLOCK.checksum(bytes)
 }
 
 #[cfg(test)]

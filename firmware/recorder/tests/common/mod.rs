@@ -147,5 +147,5 @@ impl CardDevice for MemCard {
 
 /// A parity buffer for the whole test run.
 pub fn held() -> &'static Buffers {
-    Box::leak(Box::default())
+    Box::leak(Box::new(Buffers::new()))
 }

@@ -7,7 +7,7 @@ use anyhow::{Result, anyhow};
 use hums_core::parameters::Params;
 use hums_store::{Key, Store};
 
-use super::outside::{Memory, Outside};
+use super::outside::{Memory, Outside, Slot};
 use super::pipeline::Pipeline;
 use super::{PowerOn, identity};
 use crate::card::SimCard;
@@ -68,12 +68,11 @@ pub fn run(
     let mut findings = Vec::new();
     let mut keep = |finding| findings.push(finding);
     let outside = Outside {
-        card: board.card,
+        slot: &Slot { card: board.card, power_on_us: 0 },
         flash: &flash,
         gs: &mut gs,
         autopilot: &mut autopilot,
         findings: &mut keep,
-        power_on_us: 0,
         reboot_at_us: None,
     };
     let mut pipeline = Pipeline::new(outside, &mut memory, identity(1), 1);

@@ -19,7 +19,7 @@ use hums_blackbox::record::{Boot, Stats};
 use hums_core::parameters::Params;
 use hums_onboard::ResetCause;
 use hums_recorder::status::CardReading;
-use outside::{Memory, Outside};
+use outside::{Memory, Outside, Slot};
 use pipeline::Pipeline;
 
 use super::arrivals::Arrivals;
@@ -103,12 +103,11 @@ pub fn power_on(
     let mut memory = Memory::new(params);
     let mut autopilot = std::io::sink();
     let outside = Outside {
-        card,
+        slot: &Slot { card, power_on_us: 0 },
         flash: &store::open(None, &[])?,
         gs,
         autopilot: &mut autopilot,
         findings: &mut drop,
-        power_on_us: 0,
         reboot_at_us: None,
     };
     let mut pipeline = Pipeline::new(outside, &mut memory, identity(boots), boots);
@@ -184,12 +183,11 @@ impl World<'_> {
             }
         };
         let outside = Outside {
-            card: self.card,
+            slot: &Slot { card: self.card, power_on_us: self.power_on_us },
             flash: self.flash,
             gs: &mut *self.gs,
             autopilot: &mut *self.autopilot,
             findings: &mut keep,
-            power_on_us: self.power_on_us,
             reboot_at_us: self.reboots.first().copied(),
         };
         let mut pipeline =

@@ -33,8 +33,8 @@ impl Memory {
     pub(super) fn new(params: &Params) -> Self {
         Self {
             card_status: CardStatus::new(),
-            port_status: PortStatus::new(),
-            store_status: StoreStatus::new(),
+            port_status: PortStatus::default(),
+            store_status: StoreStatus::default(),
             mailbox: Mailbox::new(),
             held: Buffers::new(),
             queues: Box::new(Queues::new()),
@@ -49,20 +49,19 @@ impl Memory {
 }
 
 pub(super) struct Outside<'a, 'w> {
-    pub(super) card: &'a SimCard,
+    pub(super) slot: &'a Slot<'a>,
     pub(super) flash: &'a FileFlash,
     pub(super) gs: &'w mut (dyn Write + Send),
     pub(super) autopilot: &'w mut (dyn Write + Send),
     /// Changes of level.
     pub(super) findings: &'w mut dyn FnMut(Finding),
-    /// Microseconds since the first input byte.
-    pub(super) power_on_us: u64,
     /// Next short power cut, microseconds since the first input byte.
     pub(super) reboot_at_us: Option<u64>,
 }
 
 pub(super) struct Slot<'a> {
     pub(super) card: &'a SimCard,
+    /// Microseconds since the first input byte.
     pub(super) power_on_us: u64,
 }
 

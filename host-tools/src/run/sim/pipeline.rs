@@ -12,8 +12,8 @@ use hums_onboard::monitoring::TICK;
 use hums_onboard::persist::SaveStep;
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX};
 use hums_onboard::uplink::{self, Uplink};
-use hums_onboard::{Handover, Monitoring, PortStatus, Reception, ResetCause, Service, Storage, StoreWriter};
-use hums_recorder::CardStatus;
+use hums_onboard::{Handover, Monitoring, PortStatus, Reception, ResetCause, Service, StoreWriter, storage};
+use hums_recorder::{CardStatus, Recorder};
 
 use super::outside::{Memory, Outside, Slot};
 use crate::files::settle;
@@ -35,7 +35,7 @@ pub(super) struct Pipeline<'a, 'w> {
     reception: Reception<'a>,
     uplink: Uplink,
     monitoring: Monitoring<'a>,
-    storage: Storage<'a, Slot<'a>>,
+    recorder: Recorder<'a, Slot<'a>>,
     store_writer: StoreWriter<'a, FileFlash>,
     handover: Handover<'a>,
     /// Since this power-on, as all that follow.
@@ -67,7 +67,7 @@ impl Machine for Pipeline<'_, '_> {
         if self.outside.reboot_at_us.is_some_and(|at| chunk.at_us >= at) {
             return Ok(false);
         }
-        let at = Instant::from_micros(chunk.at_us.saturating_sub(self.outside.power_on_us));
+        let at = Instant::from_micros(chunk.at_us.saturating_sub(self.outside.slot.power_on_us));
         if !self.advance(at)? {
             return Ok(false);
         }
@@ -84,7 +84,7 @@ impl Machine for Pipeline<'_, '_> {
             // Nobody listens while the power is off.
             return Ok(true);
         }
-        let at = Instant::from_micros(chunk.at_us.saturating_sub(self.outside.power_on_us));
+        let at = Instant::from_micros(chunk.at_us.saturating_sub(self.outside.slot.power_on_us));
         if !self.advance(at)? {
             return Ok(false);
         }
@@ -109,24 +109,20 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         store_writer.turn_ahead();
         store_writer.load(monitor);
         let handover = Handover::new(items_in, store_status, monitor);
-        let mut monitoring =
-            Monitoring::new(monitor, writer, identity, ResetCause::PowerOn, card_status, port_status);
+        let (out, ends) = queues.split();
+        let cause = ResetCause::PowerOn;
+        let mut monitoring = Monitoring::new(monitor, writer, identity, cause, card_status, port_status, out);
         monitoring.restore_signing(&mut store_writer);
         Self {
             slot_status: card_status,
             port_status,
-            ends: queues.split(),
+            ends,
             store_writer,
             handover,
             reception: Reception::new(port_status),
             uplink: Uplink::new(Port::Gs),
             monitoring,
-            storage: Storage::new(
-                Slot { card: outside.card, power_on_us: outside.power_on_us },
-                card_status,
-                held,
-                entropy,
-            ),
+            recorder: Recorder::new(outside.slot, card_status, held, entropy),
             outside,
             now: Instant::ZERO,
             tick_at: Instant::ZERO + TICK,
@@ -139,7 +135,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     }
 
     pub(super) fn start(&mut self) -> Result<()> {
-        self.monitoring.start(self.now, &mut self.ends.sectors_in);
+        self.monitoring.start(self.now);
         self.after_monitor()
     }
 
@@ -185,22 +181,20 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     }
 
     fn drain(&mut self) -> Result<()> {
-        let Ends { frames_out, sectors_in, gs_in, .. } = &mut self.ends;
-        while self.monitoring.drain(frames_out, sectors_in, gs_in) {}
+        while self.monitoring.drain(&mut self.ends.frames_out) {}
         self.after_monitor()
     }
 
     fn listen(&mut self) -> Result<()> {
-        let Ends { uplink_out, sectors_in, gs_in, .. } = &mut self.ends;
-        while self.monitoring.uplink(self.now, uplink_out, sectors_in, gs_in) {}
+        while self.monitoring.uplink(self.now, &mut self.ends.uplink_out) {}
         self.after_monitor()
     }
 
     fn tick(&mut self) -> Result<()> {
-        let Self { monitoring, ends, outside, now, .. } = self;
-        let Outside { findings, power_on_us, .. } = outside;
-        monitoring.tick(*now, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
-            let at = Instant::from_micros(power_on_us.saturating_add(now.as_micros()));
+        let Self { monitoring, outside, now, .. } = self;
+        let Outside { findings, slot, .. } = outside;
+        monitoring.tick(*now, &mut |finding| {
+            let at = Instant::from_micros(slot.power_on_us.saturating_add(now.as_micros()));
             findings(Finding { at, ..Finding::new(*now, finding) });
         });
         let frames = self.port_status.read().frames;
@@ -240,11 +234,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     }
 
     fn storage(&mut self) {
-        let begin_us = self.outside.power_on_us.saturating_add(self.now.as_micros());
-        self.outside.card.set_clock(begin_us);
-        let service = self.storage.service(self.now, &mut self.ends.sectors_out);
-        let served = service == Service::Idle && self.storage.serve(&mut self.ends.shelf);
-        let took = Span::from_micros(self.outside.card.clock().saturating_sub(begin_us));
+        let begin_us = self.outside.slot.power_on_us.saturating_add(self.now.as_micros());
+        self.outside.slot.card.set_clock(begin_us);
+        let service = storage::service(&mut self.recorder, self.now, &mut self.ends.sectors_out);
+        let served = service == Service::Idle && self.ends.shelf.serve(&mut self.recorder);
+        let took = Span::from_micros(self.outside.slot.card.clock().saturating_sub(begin_us));
         self.busy_until = self.now + took;
         self.storage_at = match service {
             Service::Idle if self.ends.sectors_out.is_empty() && !served => None,
@@ -254,7 +248,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     }
 
     fn is_dead(&self) -> bool {
-        self.outside.card.is_dead() || self.outside.flash.is_dead()
+        self.outside.slot.card.is_dead() || self.outside.flash.is_dead()
     }
 
     fn keep(&mut self, may_erase: bool) {
@@ -263,7 +257,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
 
     fn note(&mut self) {
         while let Some(news) = self.handover.news() {
-            self.monitoring.note(self.now, news.severity, news.text, &mut self.ends.sectors_in);
+            self.monitoring.note(self.now, news.severity, news.text);
         }
     }
 }

@@ -13,9 +13,9 @@ use hums_core::parameters::Params;
 use hums_link::frame::{Check, Frame};
 use hums_link::request::Port;
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX, Queues};
-use hums_onboard::storage::NO_CARD_RETRY;
-use hums_onboard::{Monitoring, PortStatus, ResetCause, Service, Storage, Supervisor, Task};
-use hums_recorder::{BLOCK_BYTES, Buffers, Card, CardState, CardStatus, LogName, SpiCard};
+use hums_onboard::storage::{self, NO_CARD_RETRY};
+use hums_onboard::{Monitoring, PortStatus, ResetCause, Service, Supervisor, Task};
+use hums_recorder::{BLOCK_BYTES, Buffers, Card, CardState, CardStatus, LogName, Recorder, SpiCard};
 use hums_sdcard::{MS, Medium, Model, SimPort, Slot};
 
 /// 2.5 kB/s of log.
@@ -42,7 +42,7 @@ pub struct Rig {
     port: &'static PortStatus,
     ends: Ends<'static>,
     monitoring: Monitoring<'static>,
-    storage: Storage<'static, SpiCard<SimPort>>,
+    recorder: Recorder<'static, SpiCard<SimPort>>,
     frame_at: Instant,
     tick_at: Instant,
     frames: u32,
@@ -69,12 +69,14 @@ impl Rig {
     pub fn new(card: impl Into<Option<Model>>) -> Self {
         let slot = Slot::new(card.into());
         let status: &CardStatus = Box::leak(Box::default());
-        let port: &PortStatus = Box::leak(Box::new(PortStatus::new()));
+        let port: &PortStatus = Box::leak(Box::default());
         let monitor = Box::leak(Box::new(Monitor::new(Params::defaults())));
         let writer = Box::leak(Box::new(Writer::new()));
         let identity = Boot { version: "1.2.3", board: "rig", ..Boot::default() };
-        let held: &Buffers = Box::leak(Box::default());
+        let held = Box::leak(Box::new(Buffers::new()));
         let queues = Box::leak(Box::new(Queues::new()));
+        let (out, ends) = queues.split();
+        let card = Box::leak(Box::new(SpiCard::new(slot.port())));
         let mut rig = Self {
             status,
             port,
@@ -86,9 +88,9 @@ impl Rig {
             is_silent: false,
             longest: Span::ZERO,
             supervisor: Supervisor::new(),
-            ends: queues.split(),
-            monitoring: Monitoring::new(monitor, writer, identity, ResetCause::PowerOn, status, port),
-            storage: Storage::new(SpiCard::new(slot.port()), status, held, 77),
+            ends,
+            monitoring: Monitoring::new(monitor, writer, identity, ResetCause::PowerOn, status, port, out),
+            recorder: Recorder::new(card, status, held, 77),
             frame_at: Instant::ZERO,
             tick_at: Instant::ZERO + TICK,
             frames: 0,
@@ -96,7 +98,7 @@ impl Rig {
             said: 0,
             slot,
         };
-        rig.monitoring.start(Instant::ZERO, &mut rig.ends.sectors_in);
+        rig.monitoring.start(Instant::ZERO);
         rig
     }
 
@@ -109,9 +111,9 @@ impl Rig {
     fn service(&mut self) -> Service {
         let begun = self.slot.now();
         self.supervisor.report(Task::Storage, begun);
-        let service = self.storage.service(begun, &mut self.ends.sectors_out);
+        let service = storage::service(&mut self.recorder, begun, &mut self.ends.sectors_out);
         if service == Service::Idle {
-            self.storage.serve(&mut self.ends.shelf);
+            self.ends.shelf.serve(&mut self.recorder);
         }
         let took = self.slot.now().since(begun);
         self.longest = self.longest.max(took);
@@ -163,17 +165,16 @@ impl Rig {
         let bytes = frame(1, 1, id, payload);
         let frame = Frame::parse(&bytes).expect("a frame");
         assert!(self.ends.frames_in.put(self.frame_at.as_micros(), &frame));
-        let Ends { frames_out, sectors_in, gs_in, .. } = &mut self.ends;
-        while self.monitoring.drain(frames_out, sectors_in, gs_in) {}
+        while self.monitoring.drain(&mut self.ends.frames_out) {}
     }
 
     fn tick(&mut self) {
-        let Self { monitoring, ends, findings, tick_at, supervisor, .. } = self;
+        let Self { monitoring, findings, tick_at, supervisor, .. } = self;
         for task in [Task::Reception, Task::Monitor, Task::Downlink] {
             supervisor.report(task, *tick_at);
         }
         assert_eq!(supervisor.silent(*tick_at), None, "the watchdog would bite");
-        monitoring.tick(*tick_at, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
+        monitoring.tick(*tick_at, &mut |finding| {
             findings.push((Instant::of(finding.at, *tick_at), finding.check, finding.level));
         });
     }
@@ -221,8 +222,7 @@ impl Rig {
         let now = self.slot.now();
         let frame = Frame::parse(&bytes).expect("a frame");
         assert!(self.ends.uplink_in.put(Port::Gs as u64, &frame));
-        let Ends { uplink_out, sectors_in, gs_in, .. } = &mut self.ends;
-        while self.monitoring.uplink(now, uplink_out, sectors_in, gs_in) {}
+        while self.monitoring.uplink(now, &mut self.ends.uplink_out) {}
     }
 
     pub fn state(&self) -> CardState {
@@ -246,17 +246,16 @@ impl Rig {
     /// Every frame is on one of these cards, once and in order, or counted as lost. Returns the lost ones.
     #[track_caller]
     pub fn finish(mut self, cards: &[&Medium]) -> (Vec<Found>, u64) {
-        let Ends { sectors_in, gs_in, .. } = &mut self.ends;
-        self.monitoring.finish(self.slot.now(), sectors_in, gs_in);
+        self.monitoring.finish(self.slot.now());
         let end = self.slot.now() + Span::from_secs(10);
-        while !self.storage.finish_after(&self.ends.sectors_out) && self.slot.now() < end {
+        while !storage::finish_after(&mut self.recorder, &self.ends.sectors_out) && self.slot.now() < end {
             let begun = self.slot.now();
-            self.storage.service(begun, &mut self.ends.sectors_out);
+            storage::service(&mut self.recorder, begun, &mut self.ends.sectors_out);
             self.slot.advance_to(self.slot.now_ns() + 10 * MS);
         }
         let left = self.ends.sectors_out.abandon();
         let card_lost = u64::from(self.status.read().frames_lost);
-        let refused = self.monitoring.stats(&self.ends.gs_in).frames_lost;
+        let refused = self.monitoring.stats().frames_lost;
         let lost = refused.max(card_lost) + left;
         let found: Vec<Found> = cards.iter().map(|medium| read(medium)).collect();
         let on_cards: u64 = found.iter().map(|found| found.all_frames).sum();
@@ -319,8 +318,8 @@ fn frame(system: u8, component: u8, id: u32, payload: &[u8]) -> Vec<u8> {
 #[track_caller]
 pub fn read(medium: &Medium) -> Found {
     let (status, held) = (CardStatus::new(), Buffers::new());
-    let mounted = Card::mount(medium.clone(), &status, &held);
-    let card = mounted.map_err(|(_, error)| error.to_string()).expect("the card is in order");
+    let mounted = Card::mount(medium, &status, &held);
+    let card = mounted.map_err(|error| error.to_string()).expect("the card is in order");
     let mut sessions: BTreeMap<u32, Vec<LogName>> = BTreeMap::new();
     card.logs(|log| sessions.entry(log.name.session).or_default().push(log.name)).expect("it lists");
     let mut found = Found { sessions: sessions.len(), ..Found::default() };

@@ -23,6 +23,7 @@ const NONE: usize = usize::MAX;
 
 const CALM: Cdf = Cdf::from_sizes([600, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20]);
 
+#[derive(zerocopy::FromZeros)]
 pub(crate) struct Distributions {
     blocks: [Cdf; BLOCKS],
     used: u16,
@@ -37,17 +38,6 @@ pub(crate) struct Distributions {
 }
 
 impl Distributions {
-    pub(crate) const fn new() -> Self {
-        Self {
-            blocks: [Cdf::UNSET; BLOCKS],
-            used: 0,
-            calm: [Cdf::UNSET; KINDS],
-            young: [Cdf::UNSET; KINDS],
-            first: [Cdf::UNSET; KINDS],
-            after: [[Cdf::UNSET; SYMBOLS]; 4],
-        }
-    }
-
     pub(crate) fn reset(&mut self) {
         self.used = 0;
         self.calm = [CALM; KINDS];

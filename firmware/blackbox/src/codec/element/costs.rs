@@ -5,7 +5,7 @@ pub(super) const PREDICTIONS: usize = 6;
 const UNKNOWN: u8 = 100;
 
 /// Four in a word, which are charged in one step, and two more.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, zerocopy::FromZeros)]
 pub(super) struct Costs {
     /// Bytes, to keep the element small.
     first: [u8; 4],
@@ -13,8 +13,6 @@ pub(super) struct Costs {
 }
 
 impl Costs {
-    /// All zeros: of a place that no slot has claimed.
-    pub(super) const UNSET: Self = Self { first: [0; 4], more: [0; 2] };
     pub(super) const NEW: Self = Self { first: [0, 0, 0, UNKNOWN], more: [UNKNOWN; 2] };
 
     #[inline]

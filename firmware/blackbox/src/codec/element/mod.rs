@@ -11,6 +11,8 @@ mod integers;
 mod rest;
 mod times;
 
+use zerocopy::FromZeros;
+
 pub(crate) use classes::Distributions;
 use costs::Costs;
 pub(super) use rest::{integer_class, integer_rest};
@@ -67,7 +69,7 @@ impl ElementKind {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, FromZeros)]
 pub(crate) struct Element {
     /// The last value's bits; of a 64-bit element the lower half.
     pub(crate) last: u32,
@@ -101,22 +103,6 @@ const CLASS_AT: u32 = 3;
 const CLASS: u8 = 15 << CLASS_AT;
 
 impl Element {
-    /// All zeros: a place that no slot has claimed.
-    const UNSET: Self = Self {
-        last: 0,
-        step: 0,
-        aux: 0,
-        costs: Costs::UNSET,
-        block: 0,
-        other: 0,
-        kind: ElementKind::Integer1 as u8,
-        detail: 0,
-        end: 0,
-        decimal: 0,
-        exponent: 0,
-        quiet: 0,
-    };
-
     pub(crate) const fn new(what: ElementKind, detail: u8, end: u8) -> Self {
         Self {
             last: 0,
@@ -232,16 +218,13 @@ pub(crate) struct Context {
     pub(crate) link: Option<(f32, bool)>,
 }
 
+#[derive(FromZeros)]
 pub(crate) struct Elements {
     pub(crate) list: [Element; ELEMENTS],
     used: u16,
 }
 
 impl Elements {
-    pub(crate) const fn new() -> Self {
-        Self { list: [Element::UNSET; ELEMENTS], used: 0 }
-    }
-
     pub(crate) fn reset(&mut self) {
         self.used = 0;
     }
@@ -264,7 +247,7 @@ mod tests {
     #[test]
     fn whatever_memory_holds_is_a_kind() {
         for kind in 0..=u8::MAX {
-            let element = Element { kind, ..Element::UNSET };
+            let element = Element { kind, ..crate::zeros() };
             let expected = if kind < 11 { kind } else { ElementKind::Upper as u8 };
             assert_eq!((element.what() as u8, element.size() <= 8), (expected, true));
         }
@@ -272,7 +255,7 @@ mod tests {
 
     #[test]
     fn elements_are_claimed_until_the_last_one_and_no_further() {
-        let mut elements = Elements::new();
+        let mut elements: Elements = crate::zeros();
         assert_eq!(elements.claim(ELEMENTS - 1), Some(0));
         assert_eq!(elements.claim(2), None);
         assert_eq!(elements.claim(1), Some(ELEMENTS as u16 - 1));

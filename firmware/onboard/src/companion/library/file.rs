@@ -138,7 +138,7 @@ impl Job {
         &mut self,
         answer: Option<(&Answer, &[u8])>,
         open: &mut Option<Open>,
-        out: &mut JobOut<'_, '_, '_>,
+        out: &mut JobOut<'_, '_>,
     ) -> JobStep {
         let mut buffer = [0; ftp::HEAD + ftp::DATA_MAX];
         let Self { reply, kind } = self;
@@ -216,7 +216,7 @@ impl Job {
         bytes: u32,
         data: &[u8],
         buffer: &mut [u8; ftp::HEAD + ftp::DATA_MAX],
-        out: &mut JobOut<'_, '_, '_>,
+        out: &mut JobOut<'_, '_>,
     ) -> JobStep {
         let Self { reply, kind } = self;
         let (asked, mut left) = match *kind {

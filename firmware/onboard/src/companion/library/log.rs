@@ -96,12 +96,7 @@ impl List {
     }
 
     /// `LOG_ENTRY`
-    pub(super) fn step(
-        &mut self,
-        answer: &Answer,
-        places: &mut Places,
-        out: &mut JobOut<'_, '_, '_>,
-    ) -> JobStep {
+    pub(super) fn step(&mut self, answer: &Answer, places: &mut Places, out: &mut JobOut<'_, '_>) -> JobStep {
         let count = answer.count;
         if answer.found == Err(NoLog::Unread) {
             self.lacks = true;
@@ -157,7 +152,7 @@ impl Data {
         &mut self,
         (answer, data): (&Answer, &[u8]),
         places: &mut Places,
-        out: &mut JobOut<'_, '_, '_>,
+        out: &mut JobOut<'_, '_>,
     ) -> JobStep {
         match self.which {
             // The card cannot read it now. The client asks again.
@@ -183,7 +178,7 @@ impl Data {
         self.send(answer, data, out)
     }
 
-    fn send(&mut self, answer: &Answer, data: &[u8], out: &mut JobOut<'_, '_, '_>) -> JobStep {
+    fn send(&mut self, answer: &Answer, data: &[u8], out: &mut JobOut<'_, '_>) -> JobStep {
         // Sent before the port was full.
         let mut rest = data.get(self.offset.wrapping_sub(answer.offset) as usize..).unwrap_or_default();
         loop {

@@ -155,7 +155,7 @@ impl Library {
         seen
     }
 
-    fn step(&mut self, job: &mut Job, answered: Option<&Answered>, out: &mut JobOut<'_, '_, '_>) -> JobStep {
+    fn step(&mut self, job: &mut Job, answered: Option<&Answered>, out: &mut JobOut<'_, '_>) -> JobStep {
         let answer = answered.map(|(answer, data)| (answer, data.as_slice()));
         match (&mut job.kind, answer) {
             (Kind::List(list), Some((answer, _))) => list.step(answer, &mut self.places, out),

@@ -23,13 +23,13 @@ const FTP_FRAME: usize = 12 + 3 + hums_link::ftp::HEAD + 13;
 /// Worth a message.
 const FTP_DATA_MIN: usize = 20;
 
-pub(super) struct JobOut<'o, 'w, 'q> {
+pub(super) struct JobOut<'o, 'q> {
     pub(super) now: Instant,
     pub(super) asker: Requester,
-    pub(super) ways: &'o mut Outlets<'w, 'q>,
+    pub(super) ways: &'o mut Outlets<'q>,
 }
 
-impl JobOut<'_, '_, '_> {
+impl JobOut<'_, '_> {
     pub(super) fn say(&mut self, packet: &Packet, then: JobStep) -> JobStep {
         if self.ways.send(self.now, self.asker.port, Class::Bulk, packet) { then } else { JobStep::Wait }
     }
@@ -39,7 +39,7 @@ impl JobOut<'_, '_, '_> {
         self.say(&messages::file_transfer(system, component, payload), then)
     }
 
-    pub(super) fn file_data_max(&self) -> usize {
+    pub(super) fn file_data_max(&mut self) -> usize {
         self.ways.bulk_frame_max(self.asker.port).saturating_sub(FTP_FRAME).max(FTP_DATA_MIN)
     }
 }

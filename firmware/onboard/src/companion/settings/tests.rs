@@ -62,12 +62,12 @@ fn after<T>(
     comes: &[(u64, Comes)],
     known: impl FnOnce(&Monitor) -> T,
 ) -> T {
-    let (card, port) = (CardStatus::new(), PortStatus::new());
+    let (card, port) = (CardStatus::new(), PortStatus::default());
     let (mut monitor, mut writer) = (Box::new(*monitor), Box::new(Writer::new()));
     let mut queues = Box::new(Queues::new());
-    let mut ends = queues.split();
-    let mut body = Monitoring::new(&mut monitor, &mut writer, Boot::default(), cause, &card, &port);
-    body.start(Instant::ZERO, &mut ends.sectors_in);
+    let (out, mut ends) = queues.split();
+    let mut body = Monitoring::new(&mut monitor, &mut writer, Boot::default(), cause, &card, &port, out);
+    body.start(Instant::ZERO);
     let mut encoder = Encoder::of(1, 1);
     let mut station = Encoder::of(255, 190);
     let last_s = comes.last().map_or(0, |(at_s, _)| *at_s);
@@ -95,9 +95,9 @@ fn after<T>(
                 NoCard => card.set_state(CardState::Absent),
             }
         }
-        while body.drain(&mut ends.frames_out, &mut ends.sectors_in, &mut ends.gs_in) {}
-        while body.uplink(now, &mut ends.uplink_out, &mut ends.sectors_in, &mut ends.gs_in) {}
-        body.tick(now, &mut ends.sectors_in, &mut ends.gs_in, &mut |_| {});
+        while body.drain(&mut ends.frames_out) {}
+        while body.uplink(now, &mut ends.uplink_out) {}
+        body.tick(now, &mut |_| {});
         if tick % ticks_an_answer == 0 {
             ends.shelf.serve_text(text.as_bytes());
         }

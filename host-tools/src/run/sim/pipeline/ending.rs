@@ -4,8 +4,6 @@ use anyhow::Result;
 use hums_blackbox::record::Stats;
 use hums_core::clock::Span;
 use hums_core::parameters::Params;
-use hums_onboard::port::PortReading;
-use hums_onboard::queues::Ends;
 use hums_recorder::CardState;
 
 use super::Pipeline;
@@ -18,8 +16,7 @@ impl Pipeline<'_, '_> {
         self.reception.idle(self.now, &mut self.ends.frames_in);
         self.drain()?;
         self.save_all();
-        let Ends { sectors_in, gs_in, .. } = &mut self.ends;
-        self.monitoring.finish(self.now, sectors_in, gs_in);
+        self.monitoring.finish(self.now);
         let patience = self.now + CARD_PATIENCE;
         while !self.ends.sectors_out.is_empty() && !self.is_dead() {
             let at = self.storage_at.unwrap_or(self.now).max(self.now);
@@ -30,7 +27,7 @@ impl Pipeline<'_, '_> {
             self.storage();
         }
         self.now = self.now.max(self.busy_until);
-        self.storage.finish();
+        self.recorder.finish();
         self.now = self.now.max(self.gs_at);
         for _ in 0..1000 {
             self.send_gs()?;
@@ -54,9 +51,7 @@ impl Pipeline<'_, '_> {
     }
 
     pub(in crate::run::sim) fn stats(&self) -> Stats {
-        let mut stats = self.monitoring.stats(&self.ends.gs_in);
-        catch_up(&mut stats, self.port_status.read());
-        stats
+        self.monitoring.stats()
     }
 
     pub(in crate::run::sim) fn params(&self) -> Params {
@@ -69,17 +64,5 @@ impl Pipeline<'_, '_> {
 
     pub(in crate::run::sim) fn has_overwritten(&self) -> bool {
         self.slot_status.read().segments_overwritten > 0
-    }
-}
-
-/// The monitor adds counters at each tick; power may have gone since.
-fn catch_up(stats: &mut Stats, port: PortReading) {
-    for (sum, counter) in [
-        (&mut stats.frames_in, port.frames),
-        (&mut stats.bytes_in, port.bytes),
-        (&mut stats.bytes_not_frames, port.bytes_not_frames),
-    ] {
-        // The sum modulo 2^32, and ahead of it.
-        *sum += u64::from(counter.wrapping_sub(*sum as u32));
     }
 }
