@@ -140,13 +140,19 @@ mod tests {
     use hums_core::health::exceedance::Crossings;
     use hums_core::health::{Level, Subsystem};
     use hums_core::protect::{Action, Stage};
+    use hums_dialect::crc;
 
     use super::*;
 
-    fn reads_back(record: Record<'_>) {
+    fn reads_back(record: Record<'_>, sum: u16) {
         let mut stored = [0; RECORD_BYTES_MAX];
         let len = record.store(&mut stored).expect("fits");
         assert_eq!(Record::read(&stored[..len]), record);
+        assert_eq!(
+            crc::update(crc::START, &stored[..len]),
+            sum,
+            "the stored bytes of {record:?} have changed"
+        );
         for cut in 0..len {
             let _ = Record::read(&stored[..cut]);
         }
@@ -158,99 +164,112 @@ mod tests {
     #[test]
     fn who_recorded_whom_and_what_was_found_read_back() {
         let at = AT;
-        reads_back(Record::Boot(Boot {
-            version: "0.1.0",
-            git: "abcdef",
-            board: "f405",
-            reset: 7,
-            reset_name: "pin",
-            uid: *b"123456789012",
-            boots: 99,
-            before: LastSession {
-                found: PreviousEnd::Frames,
-                number: 7,
-                session: 0xfeed,
-                sectors: 99,
-                frames: 12_345,
-                check: 0xfedc_ba98,
-            },
-        }));
-        reads_back(Record::Mark(Mark { why: MarkReason::Landed, sector: 70_000, frames: u32::MAX }));
-        reads_back(Record::Vehicle(Vehicle {
-            system: 1,
-            component: 1,
-            autopilot: 12,
-            vehicle_type: 2,
-            firmware: 0x0401_0203,
-            uid: u64::MAX,
-        }));
-        reads_back(Record::Parameter(Parameter {
-            name: "REC_MODE",
-            value: -1.5,
-            changed: true,
-            by: (255, 190),
-        }));
-        reads_back(Record::Clock(Clock { boot: at, utc_micros: 1_700_000_000_000_000, source: 1 }));
-        reads_back(Record::Finding(FindingRecord {
-            at,
-            subsystem: Subsystem::Power,
-            check: "batt_remaining",
-            instance: 1,
-            level: Level::Warning,
-            previous: Level::Ok,
-            value: 19.5,
-            limit: 20.0,
-            unit: "%",
-        }));
+        reads_back(
+            Record::Boot(Boot {
+                version: "0.1.0",
+                git: "abcdef",
+                board: "f405",
+                reset: 7,
+                reset_name: "pin",
+                uid: *b"123456789012",
+                boots: 99,
+                before: LastSession {
+                    found: PreviousEnd::Frames,
+                    number: 7,
+                    session: 0xfeed,
+                    sectors: 99,
+                    frames: 12_345,
+                    check: 0xfedc_ba98,
+                },
+            }),
+            0x688d,
+        );
+        reads_back(Record::Mark(Mark { why: MarkReason::Landed, sector: 70_000, frames: u32::MAX }), 0xce9c);
+        reads_back(
+            Record::Vehicle(Vehicle {
+                system: 1,
+                component: 1,
+                autopilot: 12,
+                vehicle_type: 2,
+                firmware: 0x0401_0203,
+                uid: u64::MAX,
+            }),
+            0xe007,
+        );
+        reads_back(
+            Record::Parameter(Parameter { name: "REC_MODE", value: -1.5, changed: true, by: (255, 190) }),
+            0xfe21,
+        );
+        reads_back(Record::Clock(Clock { boot: at, utc_micros: 1_700_000_000_000_000, source: 1 }), 0x1066);
+        reads_back(
+            Record::Finding(FindingRecord {
+                at,
+                subsystem: Subsystem::Power,
+                check: "batt_remaining",
+                instance: 1,
+                level: Level::Warning,
+                previous: Level::Ok,
+                value: 19.5,
+                limit: 20.0,
+                unit: "%",
+            }),
+            0x59bd,
+        );
     }
 
     #[test]
     fn what_was_counted_lost_and_worn_reads_back() {
         let (at, entries) = (AT, ENTRIES);
-        reads_back(Record::Usage(Usage::new(Moment::End, &entries)));
-        reads_back(Record::Loss(Loss { what: LossKind::QueueFull, count: 3, from: Instant::ZERO, to: at }));
-        reads_back(Record::Stats(Stats { frames_in: 1, gs_bytes: 12, ..Stats::default() }));
-        reads_back(Record::Stats(Stats { frames_in: 1, cpu_permille: 20, ..Stats::default() }));
+        reads_back(Record::Usage(Usage::new(Moment::End, &entries)), 0x5341);
+        reads_back(
+            Record::Loss(Loss { what: LossKind::QueueFull, count: 3, from: Instant::ZERO, to: at }),
+            0x7651,
+        );
+        reads_back(Record::Stats(Stats { frames_in: 1, gs_bytes: 12, ..Stats::default() }), 0x8014);
+        reads_back(Record::Stats(Stats { frames_in: 1, cpu_permille: 20, ..Stats::default() }), 0x74dc);
         let registers = core::array::from_fn(|index| index as u32);
-        reads_back(Record::Fault(Fault {
-            kind: 1,
-            task: "storage",
-            place: "card.rs:7",
-            registers,
-            message: "x",
-        }));
-        reads_back(Record::Event(Event { number: 5, text: "look" }));
-        reads_back(Record::Note(Note { severity: 6, text: "grüß" }));
+        reads_back(
+            Record::Fault(Fault { kind: 1, task: "storage", place: "card.rs:7", registers, message: "x" }),
+            0xb7c8,
+        );
+        reads_back(Record::Event(Event { number: 5, text: "look" }), 0xa398);
+        reads_back(Record::Note(Note { severity: 6, text: "grüß" }), 0x279c);
         let life = hums_core::lifetime::Lifetime { boots: 7, sessions: 5, ..Default::default() };
-        reads_back(Record::Lifetime(Lifetime::new(Moment::Start, &life, &entries)));
+        reads_back(Record::Lifetime(Lifetime::new(Moment::Start, &life, &entries)), 0x11e1);
         let crossings =
             |peak| Crossings { warnings: 3, criticals: 1, warning_tenths: 99, critical_tenths: 12, peak };
-        reads_back(Record::Exceedance(Exceedance {
-            moment: Moment::End,
-            check: "vibration",
-            instance: 2,
-            unit: "m/s2",
-            session: crossings(61.5),
-            lifetime: crossings(70.25),
-        }));
-        reads_back(Record::Component(Component {
-            why: RecordReason::Replaced,
-            place: 7,
-            kind: ComponentKind::Propeller,
-            number: 4,
-            status: Status::Red,
-            replaced: 3,
-            name: "prop 4",
-            serial: "SN 1",
-            figures: ComponentFigures { flight_s: 3_600.5, flights: 12.0, ..ComponentFigures::default() },
-            used_percent: 101.0,
-            by: (255, 190),
-            new_serial: "SN 2",
-        }));
-        reads_back(Record::Keep(Keep { all: true, from: 70_000, seconds: 30 }));
+        reads_back(
+            Record::Exceedance(Exceedance {
+                moment: Moment::End,
+                check: "vibration",
+                instance: 2,
+                unit: "m/s2",
+                session: crossings(61.5),
+                lifetime: crossings(70.25),
+            }),
+            0xca4b,
+        );
+        reads_back(
+            Record::Component(Component {
+                why: RecordReason::Replaced,
+                place: 7,
+                kind: ComponentKind::Propeller,
+                number: 4,
+                status: Status::Red,
+                replaced: 3,
+                name: "prop 4",
+                serial: "SN 1",
+                figures: ComponentFigures { flight_s: 3_600.5, flights: 12.0, ..ComponentFigures::default() },
+                used_percent: 101.0,
+                by: (255, 190),
+                new_serial: "SN 2",
+            }),
+            0x5616,
+        );
+        reads_back(Record::Keep(Keep { all: true, from: 70_000, seconds: 30 }), 0x44e5);
         let (action, stage) = (Action::Land, Stage::Answered);
-        reads_back(Record::Protection(Protection { action, stage, detail: 4, command: 21 }));
-        reads_back(Record::Unknown { kind: 200, version: 3, bytes: &[1, 2, 3] });
+        reads_back(Record::Protection(Protection { action, stage, detail: 4, command: 21 }), 0x1a6d);
+        reads_back(Record::Unknown { kind: 200, version: 3, bytes: &[1, 2, 3] }, 0x5fe5);
     }
 
     #[test]
