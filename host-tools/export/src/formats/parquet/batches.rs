@@ -37,7 +37,6 @@ fn table_of(frame: &Frame<'_>, known: bool) -> Table {
 }
 
 impl Batches {
-    /// Adds a frame.
     pub(crate) fn frame(
         &mut self,
         at: Instant,

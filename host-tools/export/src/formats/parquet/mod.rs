@@ -54,8 +54,7 @@ const GROUP_ROWS: usize = 128 * 1024;
 const PAGE_BYTES: usize = 32 * 1024;
 /// Columns of texts of a table at most that have a dictionary: it takes 73 kB of each.
 const DICTIONARIES_MAX: usize = 32;
-/// Rows that are read as fast as their statistics: such a table has these only for the columns that select sessions, and its
-/// texts have no dictionaries, which take longer to make than to do without.
+/// So few rows are read as fast as their statistics.
 const ROWS_FEW: usize = 1024;
 const SELECTING: [&str; 3] = ["vehicle", "session", "utc"];
 const OPEN_FILE_BYTES: usize = 18 << 10;
@@ -148,7 +147,7 @@ impl ParquetTables {
         }
         let Self { session, properties, tables, .. } = self;
         for file in tables.values_mut().filter(|file| file.columns.rows() >= GROUP_ROWS) {
-            file.write_group(session, properties)?;
+            file.write_group(session, properties, false)?;
         }
         let pending_bytes: usize = self.tables.values().map(|table| table.pending_bytes).sum();
         if pending_bytes > self.limits.pending_bytes {
@@ -172,7 +171,7 @@ impl ParquetTables {
             let Self { session, properties, tables, .. } = self;
             let is_one = |table: &Table| few.iter().any(|(_, few)| few == table);
             let mut few = tables.iter_mut().filter(|(table, _)| is_one(table));
-            let write = |(_, file): (&Table, &mut TableFile)| file.write_group(session, properties);
+            let write = |(_, file): (&Table, &mut TableFile)| file.write_group(session, properties, false);
             in_order(workers(), AT_ONCE, || Ok(few.next()), write, |written| written)?;
             self.close_largest()?;
         }
@@ -200,7 +199,7 @@ impl ParquetTables {
         let (session, properties) = (&self.session, &self.properties);
         let mut tables = std::mem::take(&mut self.tables).into_values();
         let write = |mut table: TableFile| {
-            table.write_group(session, properties)?;
+            table.write_group(session, properties, true)?;
             table.end_file(session)
         };
         in_order(workers(), AT_ONCE, || Ok(tables.next()), write, |written| written)?;
@@ -273,11 +272,11 @@ impl Open {
         session: &Session,
         table: &str,
         part: u32,
-        rows: &TableRows,
+        columns: &[Column],
         properties: &Properties,
+        is_large: bool,
     ) -> Result<Self> {
-        let (path, columns) = (session.path(table, part), rows.columns());
-        let is_large = rows.rows() > ROWS_FEW;
+        let path = session.path(table, part);
         // Files of numbers are a sixth smaller without a dictionary; texts gain by it.
         let texts = columns.iter().filter_map(Column::text_name).take(DICTIONARIES_MAX);
         let texts = NAMES.into_iter().chain(texts.filter(|_| is_large));
@@ -360,7 +359,8 @@ impl TableFile {
         self.open.as_ref().map_or(0, |open| open.bytes)
     }
 
-    fn write_group(&mut self, session: &Session, properties: &Properties) -> Result<()> {
+    /// `is_end`: no rows follow.
+    fn write_group(&mut self, session: &Session, properties: &Properties, is_end: bool) -> Result<()> {
         if self.columns.rows() == 0 {
             return Ok(());
         }
@@ -368,7 +368,9 @@ impl TableFile {
             Some(open) => open,
             none => {
                 self.parts += 1;
-                none.insert(Open::new(session, &self.table.name(), self.parts, &self.columns, properties)?)
+                let (name, columns) = (self.table.name(), self.columns.columns());
+                let is_large = !is_end || self.columns.rows() > ROWS_FEW;
+                none.insert(Open::new(session, &name, self.parts, columns, properties, is_large)?)
             }
         };
         open.write(&self.columns, properties).with_context(|| cannot_write(&open.path))?;
@@ -388,7 +390,8 @@ impl TableFile {
 
 #[cfg(test)]
 mod tests {
-    use parquet::file::reader::SerializedFileReader;
+    use parquet::file::metadata::RowGroupMetaData;
+    use parquet::file::reader::{FileReader as _, SerializedFileReader};
     use parquet::record::RowAccessor as _;
 
     use super::*;
@@ -442,6 +445,13 @@ mod tests {
             for path in &files {
                 let file = File::open(path).expect("a file");
                 let reader = SerializedFileReader::new(file).expect("a Parquet file");
+                let mut columns = reader.metadata().row_groups().iter().flat_map(RowGroupMetaData::columns);
+                let has_all = columns.all(|column| column.statistics().is_some());
+                assert!(
+                    has_all || Some(path) == files.last().filter(|_| files.len() > 1),
+                    "{}",
+                    path.display()
+                );
                 seconds.extend(reader.into_iter().map(|row| {
                     let row = row.expect("a row");
                     assert_eq!(row.get_string(1).expect("a session"), name);
