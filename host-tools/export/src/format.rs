@@ -114,14 +114,14 @@ impl GroupEncoder for () {
     }
 }
 
-/// Facts of a log that was read.
+/// Totals of a log.
 #[derive(Clone, Debug, Default)]
 pub struct Totals {
     /// Frames.
     pub frames: u64,
     /// Records and rows.
     pub records: u64,
-    /// As in [`Identity`](crate::identity::Identity).
+    /// The vehicle's name.
     pub vehicle: String,
 }
 

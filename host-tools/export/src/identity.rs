@@ -114,7 +114,7 @@ pub fn identity(place: &LogPlace, traits: &Traits, judges: bool, given: Option<&
     Ok(Preview { identity: Identity { vehicle, date, session, recording, epochs }, checked, about })
 }
 
-/// What tells the vehicle of a recording.
+/// Evidence of a recording's vehicle.
 #[derive(Default)]
 pub(crate) struct Sources {
     /// A packed log has no such record, so the vehicle's own messages count too.

@@ -323,7 +323,6 @@ struct Task<'a> {
     has_findings: bool,
     offset_s: f64,
     vehicle: Option<&'a str>,
-    /// The tables of the output's folder.
     fleet: Arc<Fleet>,
 }
 
@@ -337,11 +336,9 @@ struct Done {
     written: bool,
     /// Session, messages and gaps of another program's recording.
     counts: (Option<String>, u64, u64),
-    /// The original, if it is a copy.
     copy_of: Option<String>,
     /// A sentence: its outputs are there already.
     exists: Option<String>,
-    /// The files written.
     made: Vec<OutputFile>,
     remarks: Vec<String>,
 }
@@ -563,8 +560,7 @@ impl Task<'_> {
         Ok(context)
     }
 
-    /// UTC at power-on from a reading, if the log's files were begun with another one. A reading that failed
-    /// because the existing files differ may have failed for that reason.
+    /// UTC at power-on from a reading, if the log's files were begun with another one.
     #[expect(clippy::option_option, reason = "it may be known now that nobody told it")]
     fn better_epoch(
         &self,

@@ -31,7 +31,7 @@ pub struct Writers<'a> {
     rows_left_out: u64,
     /// The state of the recording, by its gaps.
     lacks: Soundness,
-    /// As in [`Identity`](crate::identity::Identity).
+    /// The vehicle's name.
     pub vehicle: String,
 }
 

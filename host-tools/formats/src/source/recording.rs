@@ -47,7 +47,7 @@ enum From {
     Log(Box<Log>),
 }
 
-/// Facts of a file that take a reading, once they are known.
+/// Cached after first reading.
 #[derive(Clone, Debug, Default)]
 struct Facts {
     format: OnceLock<Detected>,
@@ -88,7 +88,6 @@ impl LogPlace {
         }
     }
 
-    /// A file of this format.
     pub(super) fn detected(path: &Path, format: Detected) -> Self {
         let facts = Facts { format: format.into(), ..Facts::default() };
         Self { source: From::File(path.to_owned(), facts), ..Self::file(path) }
@@ -135,7 +134,7 @@ impl LogPlace {
         }
     }
 
-    /// Hash of all bytes of a file, unpacked: a compressed copy is the same recording. Zeros of anything else.
+    /// Hash of all bytes of a file, unpacked: a compressed copy is the same recording.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -246,7 +245,6 @@ pub(super) fn of_one_vehicle(title: &str) -> anyhow::Error {
     ))
 }
 
-/// The format by content; `name` is for messages.
 fn detected(input: &mut Input, name: &str) -> Result<Detected> {
     let start = input.peek(LOOK_BYTES).with_context(|| format!("{name}: cannot be read"))?;
     if let Some(what) = hint(&start) {

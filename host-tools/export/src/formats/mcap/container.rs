@@ -28,7 +28,6 @@ const METADATA_INDEX: u8 = 0x0D;
 const SUMMARY_OFFSET: u8 = 0x0E;
 const DATA_END: u8 = 0x0F;
 
-/// A file, open.
 pub(super) struct Container {
     file: SingleFile,
     path: PathBuf,
@@ -54,7 +53,6 @@ struct Chunk {
     span: Option<(u64, u64)>,
 }
 
-/// A record's content.
 #[derive(Default)]
 struct Record(Vec<u8>);
 
@@ -152,7 +150,6 @@ impl Container {
         Some(number)
     }
 
-    /// Adds a message.
     pub(super) fn message(&mut self, channel: u16, time_ns: u64, data: &[u8]) -> Result<()> {
         let Some(count) = self.counts.get_mut(usize::from(channel)) else { return Ok(()) };
         let sequence = *count as u32;

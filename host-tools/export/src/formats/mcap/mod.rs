@@ -317,6 +317,7 @@ impl Writer for Mcap {
     }
 
     fn finish(mut self, context: &Context, totals: Totals) -> Result<Finished> {
+        // The words' reading told the vehicle.
         let facts = [("vehicle", &totals.vehicle), ("session", &context.identity.session)];
         self.file.metadata("hums", &facts.map(|(name, value)| (name.to_owned(), value.clone())))?;
         let (file, messages) = self.file.finish()?;
@@ -328,5 +329,58 @@ impl Writer for Mcap {
             )
         });
         Ok(Finished { made: vec![made], remarks: left_out.into_iter().collect() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::{Path, PathBuf};
+
+    use crate::DecodeRequest;
+    use crate::formats::find;
+
+    fn decode(input: &Path, output: &Path, format: &str, split: bool) {
+        let request = DecodeRequest {
+            inputs: vec![input.to_owned()],
+            salvage: false,
+            session: None,
+            output: output.to_owned(),
+            formats: vec![find(format).expect("a format")],
+            from: None,
+            to: None,
+            split,
+            offset_s: 0.0,
+            findings: false,
+            manifest: None,
+            program: "hums",
+            vehicle: Some("quad7".to_owned()),
+            messages: Vec::new(),
+            force: false,
+            json: false,
+        };
+        crate::run(&request).expect("decoded");
+    }
+
+    #[test]
+    fn a_hums_log_has_its_vehicle_and_session_in_the_metadata() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let recording =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/flights/px4_hil_quad_low.tlog");
+        let log = dir.path().join("log.hum");
+        decode(&recording, &log, "hum", false);
+        for (folder, split, end) in [("whole/", false, ".mcap"), ("flights/", true, "-flight1.mcap")] {
+            let output = dir.path().join(folder);
+            decode(&log, &output, "mcap", split);
+            let files = fs::read_dir(&output).expect("files").map(|entry| entry.expect("a file").path());
+            let files: Vec<PathBuf> = files.filter(|path| path.to_string_lossy().ends_with(end)).collect();
+            let [file] = files.as_slice() else { panic!("{files:?}") };
+            let bytes = fs::read(file).expect("a file");
+            let name = file.file_stem().expect("a name").to_string_lossy();
+            let session = &name[name.rfind("-s").expect("a session") + 1..];
+            let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
+            let facts = ["vehicle", "quad7", "session", session].map(text).concat();
+            assert!(bytes.windows(facts.len()).any(|part| part == facts), "{session}");
+        }
     }
 }

@@ -36,7 +36,6 @@ impl Type {
     }
 }
 
-/// A field's definition.
 #[derive(Clone, Debug)]
 pub(super) struct Field {
     pub(super) name: String,
