@@ -2,14 +2,11 @@
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
-use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
-use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use hums_tests::flights::own;
-use hums_tests::frames;
 use hums_tests::live::Running;
 use hums_tests::program::{command, hums};
 use tempfile::TempDir;
@@ -259,87 +256,4 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     assert!(told.contains("is there already"), "{told}");
     let told = pull(&board, output, &["--around", "no_such_check"]).expect_code(&[2]).stderr;
     assert!(told.contains("is no time (4:20, 260.8, 2026-11-21T10:13:42Z) and no finding"), "{told}");
-}
-
-/// A proxy without `CalcFileCRC32`: opcode 14 reaches the board as an unknown one. Returns its port.
-fn without_checksums(board: u16) -> u16 {
-    const OPCODE: usize = 10 + 3 + 3;
-    const OF: usize = OPCODE + 2;
-    let (client, board_side) =
-        (UdpSocket::bind("127.0.0.1:0").unwrap(), UdpSocket::bind("127.0.0.1:0").unwrap());
-    board_side.connect(("127.0.0.1", board)).unwrap();
-    let port = client.local_addr().unwrap().port();
-    let (to_client, to_board) = (client.try_clone().unwrap(), board_side.try_clone().unwrap());
-    let asks = Arc::new(Mutex::new(None));
-    let answers = Arc::clone(&asks);
-    std::thread::spawn(move || {
-        let mut buffer = [0; 2048];
-        while let Ok((length, from)) = client.recv_from(&mut buffer) {
-            *asks.lock().unwrap() = Some(from);
-            exchange(&mut buffer[..length], OPCODE, 14, 200);
-            let _ = to_board.send(&buffer[..length]);
-        }
-    });
-    std::thread::spawn(move || {
-        let mut buffer = [0; 2048];
-        loop {
-            let Ok(length) = board_side.recv(&mut buffer) else { continue };
-            exchange(&mut buffer[..length], OF, 200, 14);
-            if let Some(from) = *answers.lock().unwrap() {
-                let _ = to_client.send_to(&buffer[..length], from);
-            }
-        }
-    });
-    port
-}
-
-fn exchange(datagram: &mut [u8], place: usize, from: u8, to: u8) {
-    const ID: [u8; 3] = [110, 0, 0];
-    const SEED: u8 = 84;
-    let mut at = 0;
-    while let Some([0xFD, length, ..]) = datagram.get(at..) {
-        let end = 10 + usize::from(*length);
-        let Some(frame) = datagram.get_mut(at..at + end + 2) else { return };
-        if frame[7..10] == ID && end > place && frame[place] == from {
-            frame[place] = to;
-            let sum = frames::checksum(&frame[1..end], SEED).to_le_bytes();
-            frame[end..].copy_from_slice(&sum);
-        }
-        at += end + 2;
-    }
-}
-
-#[test]
-fn a_board_that_computes_no_checksum_is_read_whole_and_what_its_sectors_say_counts() {
-    let (dir, card) = card(0..30_000, "1");
-    let board = board(dir);
-    let port = without_checksums(board.port);
-    let home = tempfile::tempdir().unwrap();
-    let output = home.path().join("logs");
-    let pull = || {
-        let address = format!("udpout:127.0.0.1:{port}");
-        hums(["box", "pull", "--link", &address, "--system", "1", LOG, "-o", output.to_str().unwrap()])
-    };
-    let told = pull().expect_code(&[0]).stderr;
-    assert!(told.contains("the box's firmware computes no checksum"), "{told}");
-    let log = pulled_log(&output, NUMBER);
-    assert_on_card(&log, &card);
-    let part = log.with_file_name(format!(".{}.pull.hums-part", log.file_name().unwrap().to_str().unwrap()));
-    // An empty part of a killed run.
-    let whole = fs::read(&log).unwrap();
-    fs::remove_file(&log).unwrap();
-    fs::write(&part, "").unwrap();
-    let told = pull().expect_code(&[0]).stderr;
-    assert!(!told.contains("was changed"), "{told}");
-    assert_eq!(fs::read(&log).unwrap(), whole);
-
-    // Its ends agree: it is continued, and its sectors show the changed middle.
-    fs::remove_file(&log).unwrap();
-    let mut begun = whole[..whole.len() - 1024].to_vec();
-    let middle = begun.len() / 2 + 100;
-    begun[middle] ^= 1;
-    fs::write(&part, &begun).unwrap();
-    let told = pull().expect_code(&[3]).stderr;
-    assert!(told.contains(&format!("goes on after {} bytes", begun.len())), "{told}");
-    assert!(told.contains("sector checksums: 1 failed"), "{told}");
 }

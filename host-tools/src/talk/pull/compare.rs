@@ -12,40 +12,18 @@ use super::ftp::Ftp;
 use crate::logs::board::{heading, known};
 use crate::logs::naming::{segment_name, session_name};
 
-/// Bytes compared without checksums: the first sector (with the session's random number) and the last.
 const SECTOR: u32 = 512;
 /// The box's record comes after at most three sectors of an earlier group.
 const HEADING_SECTORS: u32 = 8;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Likeness {
-    Same,
-    /// No checksum; both ends are equal.
-    SameEnds,
-    Other,
-}
-
-pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Result<Likeness> {
-    let mut file = File::open(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+/// Whether the first bytes of a file are those of the box's log, by their checksums.
+pub(super) fn is_same(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Result<bool> {
     if bytes == 0 {
-        return Ok(Likeness::Same);
+        return Ok(true);
     }
-    if let Some(theirs) = ftp.checksum(name, bytes)? {
-        let ours =
-            checksum(&mut file, bytes).with_context(|| format!("{}: cannot be read", path.display()))?;
-        return Ok(if ours == theirs { Likeness::Same } else { Likeness::Other });
-    }
-    for start in [0, bytes.saturating_sub(SECTOR)] {
-        let wanted = SECTOR.min(bytes - start);
-        let mut ours = vec![0; wanted as usize];
-        file.seek(SeekFrom::Start(u64::from(start)))
-            .and_then(|_| file.read_exact(&mut ours))
-            .with_context(|| format!("{}: cannot be read", path.display()))?;
-        if ours != bytes_of(ftp, start, wanted)? {
-            return Ok(Likeness::Other);
-        }
-    }
-    Ok(Likeness::SameEnds)
+    let theirs = ftp.checksum(name, bytes)?;
+    let ours = File::open(path).and_then(|file| checksum(&file, bytes));
+    Ok(ours.with_context(|| format!("{}: cannot be read", path.display()))? == theirs)
 }
 
 pub(super) struct Heading {
@@ -119,7 +97,7 @@ pub(super) fn bytes_of(ftp: &mut Ftp, start: u32, wanted: u32) -> Result<Vec<u8>
     Ok(bytes)
 }
 
-fn checksum(file: &mut File, bytes: u32) -> io::Result<u32> {
+fn checksum(file: &File, bytes: u32) -> io::Result<u32> {
     let mut rest = file.take(u64::from(bytes));
     let (mut sum, mut buffer) = (0, vec![0; 64 * 1024]);
     loop {

@@ -38,7 +38,6 @@ const ACK: u8 = 128;
 const NAK: u8 = 129;
 /// `MAV_FTP_ERR`
 const END_OF_FILE: u8 = 6;
-const UNKNOWN_COMMAND: u8 = 7;
 const FILE_NOT_FOUND: u8 = 10;
 
 struct Answer {
@@ -194,16 +193,16 @@ impl Ftp {
         Ok(opened.word())
     }
 
-    /// Checksum of the first bytes (at least one), as [`hums_link::ftp::checksum`]; `None` for old firmware.
-    pub(super) fn checksum(&mut self, name: &str, bytes: u32) -> Result<Option<u32>> {
+    /// Checksum of the first bytes (at least one), as [`hums_link::ftp::checksum`].
+    pub(super) fn checksum(&mut self, name: &str, bytes: u32) -> Result<u32> {
         let answer = self.ask(CHECKSUM, bytes, 0, format!("/{name}").as_bytes(), CHECKSUM_TRIES)?;
-        match answer.opcode {
-            ACK if answer.offset == bytes => Ok(Some(answer.word())),
-            // Another server: always of the whole file.
-            ACK => Ok(None),
-            _ if answer.is_nak(UNKNOWN_COMMAND) => Ok(None),
-            _ => Err(refused(&answer, "the checksum")),
+        if answer.opcode != ACK {
+            return Err(refused(&answer, "the checksum"));
         }
+        if answer.offset != bytes {
+            bail!("the answer has the checksum of another number of bytes; call again");
+        }
+        Ok(answer.word())
     }
 
     /// Downloads bytes in order, piece by piece.

@@ -1,8 +1,7 @@
 //! `hums box pull`: logs over MAVLink FTP, burst by burst.
 //!
-//! An interrupted download resumes if its bytes match the log's beginning, by checksum, or by both ends with
-//! old firmware. At the end the whole file is compared, and verified as by `hums info --verify`. File names
-//! contain the session: two cards never collide.
+//! An interrupted download resumes if its bytes match the log's beginning, by checksum. At the end the whole file is
+//! compared, and verified as by `hums info --verify`. File names contain the session: two cards never collide.
 
 mod around;
 mod compare;
@@ -17,7 +16,7 @@ use anyhow::{Context as _, Result, bail};
 use serde::Serialize;
 
 pub(super) use self::around::{WHOLE_GROUP, newest};
-use self::compare::{Heading, Likeness, compare, heading_here, heading_of};
+use self::compare::{Heading, heading_here, heading_of, is_same};
 use self::ftp::Ftp;
 use self::judge::{LogJson, judge};
 use super::Client;
@@ -202,21 +201,17 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
         return Ok(Some((path, false)));
     }
     let mut file = Output::resume(&path)?;
-    let (mut have, mut likeness) = begun(ftp, name, &mut file, length)?;
+    let mut have = begun(ftp, name, &mut file, length)?;
     if let LocalCopy::Beginning(bytes) = there
         && have < bytes
     {
         file.begin_anew()?;
         let mut shorter = File::open(&path)?.take(u64::from(bytes));
         settle(io::copy(&mut shorter, &mut file).map(|_| ()), &path)?;
-        (have, likeness) = (bytes, Likeness::Same);
+        have = bytes;
     }
     if have > 0 {
-        let who = match likeness {
-            Likeness::SameEnds => "whose first and last 512 agree with the box's log",
-            Likeness::Same | Likeness::Other => "which the box confirms by their checksum",
-        };
-        note!("{name}: goes on after {have} bytes, {who}");
+        note!("{name}: goes on after {have} bytes, which the box confirms by their checksum");
     }
     complete(ftp, name, &mut file, (have, length), &heading)?;
     file.finish()?;
@@ -282,34 +277,32 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<LocalCop
     if bytes == 0 {
         return Ok(LocalCopy::Nothing);
     }
-    match compare(ftp, name, path, bytes.min(length))? {
-        Likeness::Same | Likeness::SameEnds if about.len() > u64::from(length) => bail!(
+    if !is_same(ftp, name, path, bytes.min(length))? {
+        bail!(
+            "{} differs from the box's log of the same session, and stays. Check it with `hums info --verify`; then move it away, or name another directory with -o",
+            path.display()
+        );
+    }
+    if about.len() > u64::from(length) {
+        bail!(
             "{} is the box's log with {} more, and stays; move it away, or name another directory with -o",
             path.display(),
             count(about.len() - u64::from(length), "byte")
-        ),
-        Likeness::Same if bytes < length => Ok(LocalCopy::Beginning(bytes)),
-        Likeness::Same => Ok(LocalCopy::Whole),
-        // Not proved: downloaded again, and replaced once complete.
-        Likeness::SameEnds => Ok(LocalCopy::Nothing),
-        Likeness::Other => bail!(
-            "{} differs from the box's log of the same session, and stays. Check it with `hums info --verify`; then move it away, or name another directory with -o",
-            path.display()
-        ),
+        );
     }
+    Ok(if bytes < length { LocalCopy::Beginning(bytes) } else { LocalCopy::Whole })
 }
 
-/// Resumable bytes and their proof; another log's are deleted.
-fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u32, Likeness)> {
+/// Resumable bytes; another log's are deleted.
+fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<u32> {
     let part = file.part().to_owned();
     let bytes = u32::try_from(part.metadata()?.len()).unwrap_or(u32::MAX);
-    let likeness = if bytes <= length { compare(ftp, name, &part, bytes)? } else { Likeness::Other };
-    if likeness != Likeness::Other {
-        return Ok((bytes, likeness));
+    if bytes <= length && is_same(ftp, name, &part, bytes)? {
+        return Ok(bytes);
     }
     file.begin_anew()?;
     note!("{name}: the unfinished download differs from the box's log; it starts again");
-    Ok((0, likeness))
+    Ok(0)
 }
 
 fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, have: u32, length: u32) -> Result<()> {
@@ -330,13 +323,7 @@ fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, have: u32, length: u32) -
 fn is_whole(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<bool> {
     let flushed = file.flush();
     settle(flushed, file.path())?;
-    let likeness = compare(ftp, name, file.part(), length)?;
-    if likeness == Likeness::SameEnds {
-        note!(
-            "{name}: the box's firmware computes no checksum: only its sectors' own checks say that it is whole"
-        );
-    }
-    Ok(likeness != Likeness::Other)
+    is_same(ftp, name, file.part(), length)
 }
 
 #[cfg(test)]
