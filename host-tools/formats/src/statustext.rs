@@ -4,9 +4,7 @@ use hums_core::cause::Alert;
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
 use hums_link::alert;
-
-use crate::mavlink::ids::STATUSTEXT;
-use crate::mavlink::values::{FieldValue, Payload};
+use hums_link::packet::Fields;
 
 /// Wait for the next part, without which a text ends.
 const PATIENCE: Span = Span::from_secs(1);
@@ -48,17 +46,14 @@ impl StatusText {
     }
 
     /// The frame's checksum must hold.
-    pub fn of(at: Instant, source: Source, payload: &[u8]) -> Option<Self> {
-        let payload = Payload::new(hums_dialect::message(STATUSTEXT)?, payload);
-        let bytes = payload.fields().find_map(|(_, value)| match value {
-            FieldValue::Text(bytes) => Some(bytes),
-            _ => None,
-        })?;
-        let id = payload.number("id").unwrap_or(0.0) as u16;
-        let severity = payload.number("severity").unwrap_or(0.0) as u8;
+    pub fn of(at: Instant, source: Source, payload: &[u8]) -> Self {
+        let fields = Fields(payload);
+        let text: [u8; PART_BYTES] = fields.bytes(1);
+        let bytes = text.split(|byte| *byte == 0).next().unwrap_or_default();
+        let (severity, id) = (fields.u8(0), fields.u16(1 + PART_BYTES));
         let words = String::from_utf8_lossy(bytes).into_owned();
         let ends = id == 0 || bytes.len() < PART_BYTES;
-        Some(Self { at, source, severity, words, alert: None, id, ends })
+        Self { at, source, severity, words, alert: None, id, ends }
     }
 }
 
@@ -121,7 +116,7 @@ mod tests {
         payload.extend_from_slice(words.as_bytes());
         payload.resize(51, 0);
         payload.extend_from_slice(&id.to_le_bytes());
-        StatusText::of(Instant::from_millis(at_ms), SOURCE, &payload).expect("a text")
+        StatusText::of(Instant::from_millis(at_ms), SOURCE, &payload)
     }
 
     fn told(parts: impl IntoIterator<Item = StatusText>) -> Vec<String> {

@@ -43,11 +43,7 @@ impl Companion {
         if frame.component() != COMPONENT || frame.check() != Check::Verified {
             return;
         }
-        let mut payload = [0; 18];
-        for (to, from) in payload.iter_mut().zip(frame.payload()) {
-            *to = *from;
-        }
-        let fields = Fields(&payload);
+        let fields = Fields(frame.payload());
         match frame.id() {
             HEARTBEAT => self.heard = Some(at),
             NAMED_VALUE_FLOAT => self.float(at, fields.text(8, 10).unwrap_or_default(), fields.f32(4)),

@@ -158,9 +158,8 @@ impl Craft {
         }
         if frame.id() == STATUSTEXT && frame.check() == Check::Verified {
             let source = Source { system: frame.system(), component: frame.component() };
-            if let Some(text) = StatusText::of(at, source, frame.payload()) {
-                self.texts.take(text, &mut |text| say(history, text));
-            }
+            let text = StatusText::of(at, source, frame.payload());
+            self.texts.take(text, &mut |text| say(history, text));
         }
         if let Some((source, observation)) = observe(frame) {
             self.observe(at, source, &observation, history);

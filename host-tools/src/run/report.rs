@@ -109,22 +109,6 @@ fn findings<S: Serializer>(findings: &[Finding], serializer: S) -> Result<S::Ok,
 }
 
 impl RunReport {
-    /// The recorder's counters.
-    pub fn set_stats(&mut self, stats: &Stats) {
-        self.frames_in = stats.frames_in;
-        self.frames_logged = stats.frames_logged;
-        self.frames_lost = stats.frames_lost;
-        self.bytes_in = stats.bytes_in;
-        self.bytes_not_frames = stats.bytes_not_frames;
-        self.bytes_logged = stats.bytes_logged;
-        self.blocks_written = stats.blocks_written;
-        self.queue_bytes_max = stats.queue_bytes_max;
-        self.queue_bytes_capacity = stats.queue_bytes_capacity;
-        self.sd_stall_ms_max = stats.sd_stall_ms_max;
-        self.gs_frames = stats.gs_frames;
-        self.gs_bytes = stats.gs_bytes;
-    }
-
     /// Logs of this run, and those that it overwrote. Returns frames and bytes of the run's logs, and the recorder's
     /// last figures.
     pub fn read_card(&mut self, card: &Path, earlier: &EarlierSessions) -> Result<(u64, CardLogs)> {

@@ -22,13 +22,7 @@ pub(super) fn whole_file(path: &Path) -> Result<Log> {
     let length = length.with_context(|| format!("{}: cannot be read", path.display()))?;
     let stem = path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
     let piece = Piece { path: path.to_owned(), extents: vec![Extent { start: 0, length }] };
-    Ok(Log {
-        name: stem,
-        files: vec![path.display().to_string()],
-        pieces: vec![piece],
-        session: None,
-        left_over: false,
-    })
+    Ok(Log { name: stem, files: vec![path.display().to_string()], pieces: vec![piece], ..Log::default() })
 }
 
 fn layout(device: &ReadOnlyImage<impl Borrow<File>>) -> Result<Layout, LayoutError<io::Error>> {
@@ -162,7 +156,7 @@ fn cut_short(file: &File, device: &ReadOnlyImage<&File>) -> io::Result<Option<St
 }
 
 fn has_part_of_log(path: &Path, extents: Vec<Extent>) -> Result<bool> {
-    let lost = lost(path, extents);
+    let lost = Log { pieces: vec![Piece { path: path.to_owned(), extents }], ..Log::default() };
     let mut blocks = lost.blocks();
     while let Some(block) = blocks.next_block()? {
         if Header::read(block).is_ok() || Parity::read(block).is_some() {
@@ -170,16 +164,6 @@ fn has_part_of_log(path: &Path, extents: Vec<Extent>) -> Result<bool> {
         }
     }
     Ok(false)
-}
-
-fn lost(path: &Path, extents: Vec<Extent>) -> Log {
-    Log {
-        name: String::new(),
-        files: Vec::new(),
-        pieces: vec![Piece { path: path.to_owned(), extents }],
-        session: None,
-        left_over: false,
-    }
 }
 
 fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {
@@ -190,7 +174,7 @@ fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {
     let log = |name: String, segments: &[&CardFile]| {
         let files = segments.iter().map(|file| file.path.clone()).collect();
         let piece = |file: &&CardFile| Piece { path: path.to_owned(), extents: file.extents.clone() };
-        Log { name, files, pieces: segments.iter().map(piece).collect(), session: None, left_over: false }
+        Log { name, files, pieces: segments.iter().map(piece).collect(), ..Log::default() }
     };
     let session = |(session, mut segments): (u32, Vec<&CardFile>)| {
         segments.sort_by_key(|file| file.name);

@@ -23,7 +23,7 @@ pub struct Piece {
 }
 
 /// One log.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Log {
     /// Unique within one call: `00042`, or `card/00042` with several inputs.
     pub name: String,
@@ -130,13 +130,7 @@ impl<'a> LogBlocks<'a> {
             path: piece.path.clone(),
             extents: piece.extents.iter().map(rest).filter(|extent| extent.length > 0).collect(),
         });
-        Log {
-            name: String::new(),
-            files: Vec::new(),
-            pieces: pieces.into_iter().collect(),
-            session: None,
-            left_over: false,
-        }
+        Log { pieces: pieces.into_iter().collect(), ..Log::default() }
     }
 
     fn refill(&mut self) -> Result<bool> {

@@ -117,13 +117,7 @@ impl Files {
 /// Skips sectors of `files`.
 pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
     let everything = Piece { path: path.to_owned(), extents: vec![Extent { start: 0, length }] };
-    let all = Log {
-        name: String::new(),
-        files: Vec::new(),
-        pieces: vec![everything],
-        session: None,
-        left_over: false,
-    };
+    let all = Log { pieces: vec![everything], ..Log::default() };
     let mut blocks: LogBlocks<'_> = all.blocks();
     let mut sessions = Sessions::default();
     // 128 GB take minutes.

@@ -76,9 +76,7 @@ impl FrameReports {
     }
 
     fn text(&mut self, at: Instant, frame: &Frame<'_>, take: &mut ItemSink<'_>) -> Result<()> {
-        let Some(text) = statustext::StatusText::of(at, frame.source(), frame.payload()) else {
-            return Ok(());
-        };
+        let text = statustext::StatusText::of(at, frame.source(), frame.payload());
         hand_texts(take, |hand| self.texts.take(text, &mut |text| hand(text)))
     }
 }
@@ -122,8 +120,7 @@ pub fn parameter(frame: &Frame<'_>, autopilot: Autopilot) -> Option<(String, f64
     if frame.id() != PARAM_VALUE || frame.component() == COMPONENT || frame.check() != Check::Verified {
         return None;
     }
-    let payload: [u8; 25] = Fields(frame.payload()).bytes(0);
-    let fields = Fields(&payload);
+    let fields = Fields(frame.payload());
     let (name, value) = (fields.text(8, 16)?, fields.f32(0));
     let bits = autopilot == Autopilot::Px4 && fields.u8(24) == INT32;
     let value = if bits { f64::from(value.to_bits().cast_signed()) } else { f64::from(value) };

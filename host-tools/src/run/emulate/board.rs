@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::io::Write;
 
 use anyhow::{Context as _, Result, anyhow};
-use hums_link::framer::Framer;
+use hums_link::framer::{Framer, FramerCounts};
 use hums_sdcard::{Kind, Medium, Model, Slot};
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board as Parts, Machine as Chip, Reset};
@@ -80,15 +80,6 @@ struct Load {
     /// Start of this second, cycles and sleeping cycles by then.
     since: Option<(Ps, u64, u64)>,
     worst: f64,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Traffic {
-    pub(super) frames_in: u64,
-    pub(super) bytes_in: u64,
-    pub(super) bytes_not_frames: u64,
-    pub(super) gs_frames: u64,
-    pub(super) gs_bytes: u64,
 }
 
 impl EmulatedBoard {
@@ -193,15 +184,9 @@ impl EmulatedBoard {
         self.chip.memory(FLASH.0 + STORE.start as u32, STORE.len() as u32)
     }
 
-    pub(super) fn traffic(&self) -> Traffic {
-        let (came, went) = (self.came.counts(), self.went.counts());
-        Traffic {
-            frames_in: came.frames,
-            bytes_in: came.bytes,
-            bytes_not_frames: came.bytes_not_frames,
-            gs_frames: went.frames,
-            gs_bytes: went.bytes,
-        }
+    /// Received, and sent to the ground station.
+    pub(super) const fn traffic(&self) -> (FramerCounts, FramerCounts) {
+        (self.came.counts(), self.went.counts())
     }
 
     /// Resets by program or watchdog; the first one in seconds since the first byte.

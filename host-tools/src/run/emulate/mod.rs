@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
-use board::{EmulatedBoard, Traffic};
+use board::EmulatedBoard;
 use hums_sdcard::Medium;
 use stm32f405_model::image::Image;
 
@@ -60,7 +60,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     }
     let mut report = RunReport::default();
     let (frames, on_card) = report.read_card(&run.sd, &earlier)?;
-    tell(&mut report, &board.traffic(), frames, &on_card);
+    tell(&mut report, &board, frames, &on_card);
     report.blocks_written = medium.writes();
     if run.costs {
         report.cycles = Some(board.stage_cycles().context("--costs needs an ELF file of this version's")?);
@@ -70,14 +70,15 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     finish(run, &arrivals, &ground, &report)
 }
 
-fn tell(report: &mut RunReport, traffic: &Traffic, frames: u64, on_card: &CardLogs) {
-    report.frames_in = traffic.frames_in;
-    report.frames_logged = frames.min(traffic.frames_in);
+fn tell(report: &mut RunReport, board: &EmulatedBoard, frames: u64, on_card: &CardLogs) {
+    let (came, went) = board.traffic();
+    report.frames_in = came.frames;
+    report.frames_logged = frames.min(came.frames);
     report.frames_lost = report.frames_in - report.frames_logged;
-    report.bytes_in = traffic.bytes_in;
-    report.bytes_not_frames = traffic.bytes_not_frames;
-    report.gs_frames = traffic.gs_frames;
-    report.gs_bytes = traffic.gs_bytes;
+    report.bytes_in = came.bytes;
+    report.bytes_not_frames = came.bytes_not_frames;
+    report.gs_frames = went.frames;
+    report.gs_bytes = went.bytes;
     report.bytes_logged = on_card.bytes;
     if let Some(stats) = &on_card.stats {
         report.queue_bytes_max = stats.queue_bytes_max;

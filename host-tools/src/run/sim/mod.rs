@@ -235,12 +235,8 @@ impl World<'_> {
         let (frames, _) = report.read_card(card, earlier)?;
         // Also those that the card did not take.
         report.findings = findings;
-        if self.overwritten {
-            // The first frames may be overwritten.
-            report.frames_logged = frames.min(report.frames_in);
-            report.frames_lost = report.frames_in - report.frames_logged;
-        } else if !self.frames_on_card {
-            // Only the card shows which were saved.
+        // Only the card shows which were saved; the first frames may be overwritten.
+        if self.overwritten || !self.frames_on_card {
             report.frames_logged = frames.min(report.frames_in);
             report.frames_lost = report.frames_in - report.frames_logged;
         }

@@ -404,7 +404,7 @@ impl<'a> RemoteLog<'a> {
         };
         let name = self.files.first().map_or_else(String::new, |file| file.name.clone());
         let pieces = self.files.iter().filter_map(piece).collect();
-        Log { name, files: Vec::new(), pieces, session: None, left_over: false }
+        Log { name, pieces, ..Log::default() }
     }
 
     fn finish(self, places: &Range<u32>) -> Result<Vec<(String, PathBuf)>> {
