@@ -1,6 +1,7 @@
 //! `--params FILE` ([`hums_link::param_line`]).
 
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use hums_core::parameters::{Param, ParamError, ParamSpec, Params};
@@ -11,6 +12,50 @@ use crate::outcome::usage;
 
 /// A vehicle's file has some 40 KiB.
 const BYTES_MAX: u64 = 1 << 20;
+
+/// Limits of the user; others are defaults, or those of a log or a box.
+#[derive(Clone, Debug, Default)]
+pub struct Limits {
+    params: Params,
+    given: Arc<[&'static str]>,
+}
+
+impl Limits {
+    /// Limits with these given values, in this order.
+    pub fn new(given: &[(&'static ParamSpec, f32)]) -> Self {
+        let mut limits = Self::default();
+        for (spec, value) in given {
+            // Checked when read.
+            let _ = limits.params.set(spec.name, *value);
+        }
+        limits.given = given.iter().map(|(spec, _)| spec.name).collect();
+        limits
+    }
+
+    /// Whether the user has set any.
+    pub fn are_given(&self) -> bool {
+        !self.given.is_empty()
+    }
+
+    /// The present values.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// Unknown parameters and values out of range change nothing.
+    pub fn take(&self, params: &mut Params, name: &str, value: f32) {
+        if !self.given.contains(&name) {
+            let _ = params.set(name, value);
+        }
+    }
+
+    /// As [`Self::take`], for all vehicles that come.
+    pub fn learn(&mut self, name: &str, value: f32) {
+        let mut params = self.params;
+        self.take(&mut params, name, value);
+        self.params = params;
+    }
+}
 
 /// Parameters in order; none without a file.
 pub fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {

@@ -32,6 +32,7 @@ use super::link_loss::{LinkLoss, Verdict};
 use super::problem::{IMPACT, LISTED_MAX, Problems};
 use super::trends::{self, Episode, FlightFigures};
 use crate::names::vocabulary;
+pub use crate::params::Limits;
 use crate::part;
 use crate::source::epochs::Epochs;
 use crate::source::item::{Cause as Why, Event, Fact, FactKind, Gap, Item, Text};
@@ -62,31 +63,6 @@ pub enum HeardAt {
     Somewhere,
     /// The telemetry port: silence and lost frames are the wire's.
     OnTheWire,
-}
-
-/// Source of each limit.
-#[derive(Clone, Debug, Default)]
-pub struct Limits {
-    params: Params,
-    /// The user's, before the log's own.
-    given: Vec<&'static str>,
-}
-
-impl Limits {
-    /// The user's limits; others are defaults, or a HUMS log's.
-    pub fn new(given: &[(&'static hums_core::parameters::ParamSpec, f32)]) -> Self {
-        let mut limits = Self::default();
-        for (spec, value) in given {
-            // Checked when read.
-            let _ = limits.params.set(spec.name, *value);
-            limits.given.push(spec.name);
-        }
-        limits
-    }
-
-    fn is_given(&self) -> bool {
-        !self.given.is_empty()
-    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -148,7 +124,7 @@ impl Judge {
     /// Before the first item.
     pub fn new(limits: &Limits, format: Format) -> Self {
         Self {
-            monitor: Box::new(Monitor::new(limits.params)),
+            monitor: Box::new(Monitor::new(*limits.params())),
             earlier: None,
             limits: limits.clone(),
             format,
@@ -398,9 +374,8 @@ impl Judge {
 
     fn told(&mut self, told: &MonitorRecord) {
         match told {
-            MonitorRecord::Parameter { name, value, .. } if !self.limits.given.contains(&name.as_str()) => {
-                // Unknown or out of range: no change.
-                let _ = self.monitor.params_mut().set(name, *value);
+            MonitorRecord::Parameter { name, value, .. } => {
+                self.limits.take(self.monitor.params_mut(), name, *value);
             }
             MonitorRecord::Finding(finding) => {
                 self.checked_on_board = true;
@@ -413,7 +388,7 @@ impl Judge {
             MonitorRecord::CellsUnknown => self.cells.told_unknown(),
             MonitorRecord::StoreNew => self.cells.nothing_stored(),
             MonitorRecord::Part { place, component } => self.monitor.learn_component(*place, *component),
-            MonitorRecord::Parameter { .. } | MonitorRecord::Missing { .. } => {}
+            MonitorRecord::Missing { .. } => {}
         }
     }
 
@@ -686,7 +661,7 @@ impl Judge {
         let mut flights = std::mem::take(&mut self.flights).end(&self.monitor);
         let armed = armed(&self.monitor);
         let by =
-            if self.checked_on_board && !self.limits.is_given() { JudgedBy::Board } else { JudgedBy::Here };
+            if self.checked_on_board && !self.limits.are_given() { JudgedBy::Board } else { JudgedBy::Here };
         if !self.checked_on_board && self.wire.is_none() {
             // A packed recording may be a ground station's.
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
