@@ -574,7 +574,7 @@ state! {
     pub struct AutopilotIdentity {
         /// Flight firmware version, major, minor, patch, type from the top byte down.
         pub firmware: u32,
-        /// The autopilot's unique id; 0 unknown.
+        /// The autopilot's unique id, or its longer one folded to 8 bytes; 0 unknown.
         pub uid: u64,
     }
 

@@ -95,7 +95,14 @@ pub(super) fn processor(payload: &[u8]) -> Option<Processor> {
 
 pub(super) fn identity(payload: &[u8]) -> Option<AutopilotIdentity> {
     let version = read::<ap::AUTOPILOT_VERSION_DATA>(payload, &[])?;
-    Some(AutopilotIdentity { firmware: version.flight_sw_version, uid: version.uid })
+    let uid = if version.uid == 0 { folded(&version.uid2) } else { version.uid };
+    Some(AutopilotIdentity { firmware: version.flight_sw_version, uid })
+}
+
+/// 18 bytes as one number: `ArduPilot` sends its processor's unique id of 12 bytes in `uid2`, and 0 in `uid`.
+fn folded(uid2: &[u8; 18]) -> u64 {
+    let word = |bytes: &[u8]| bytes.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte));
+    uid2.chunks(8).fold(0, |all, bytes| all ^ word(bytes))
 }
 
 pub(super) fn landed(payload: &[u8]) -> Observation {
