@@ -3,7 +3,7 @@
 //! Field names and units are those of `PX4`'s message definitions (v1.13: places in 1e-7 degrees and millimetres). A value that the vehicle does not report is NaN,
 //! or zero in an integer. Times are those of the record.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
 use anyhow::Result;
@@ -14,7 +14,7 @@ use hums_core::observation::{
 };
 use hums_core::vehicle::Vehicle;
 
-use crate::checked::finding_words;
+use crate::checked::{Checked, finding_words};
 use crate::context::Context;
 use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, SingleFile, Spool, Totals, Writer};
 use crate::made::OutputFile;
@@ -199,6 +199,8 @@ pub(crate) struct Ulog {
     parameters_left_out: u64,
     first: Option<Instant>,
     messages: u64,
+    /// Findings still to be written, by time.
+    findings: VecDeque<Finding>,
 }
 
 fn message(kind: u8, content: &[u8]) -> Vec<u8> {
@@ -242,6 +244,15 @@ impl Ulog {
         let content =
             [&[b'0' + severity.min(7)][..], &at.as_micros().to_le_bytes(), words.as_bytes()].concat();
         self.data.write(&message(b'L', &content))
+    }
+
+    /// Writes the findings until this time.
+    fn found(&mut self, until: Instant) -> Result<()> {
+        while let Some(finding) = self.findings.pop_front_if(|finding| finding.at <= until) {
+            let severity = if finding.level == hums_core::health::Level::Critical { 2 } else { 4 };
+            self.text(finding.at, severity, &format!("HUMS: {}", finding_words(&finding)))?;
+        }
+        Ok(())
     }
 
     fn said(&mut self, said: &StoryEntry) -> Result<()> {
@@ -388,6 +399,7 @@ impl Writer for Ulog {
     const ABOUT: FormatDetails = FormatDetails {
         has_observations: true,
         has_words: true,
+        needs_identity: true,
         omits: "messages beyond some twenty quantities, the box's records",
         ..FormatDetails::new(
             "ulog",
@@ -398,7 +410,11 @@ impl Writer for Ulog {
     type Encoder = Words;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
+        // Those of this program are known before; those of a board come in order.
+        let findings = context.checked.iter().flat_map(Checked::findings).map(|(finding, _)| finding);
+        let findings = findings.filter(|finding| context.selection.has_time(finding.at, &context.epochs));
         Ok(Self {
+            findings: findings.cloned().collect(),
             file: SingleFile::open(context, path)?,
             data: Spool::new()?,
             motion: Motion::default(),
@@ -411,10 +427,14 @@ impl Writer for Ulog {
     }
 
     fn part(&mut self, context: &Context, part: Words, story: &Story) -> Result<()> {
+        if context.checked.is_none() {
+            self.findings.extend(part.findings);
+        }
         let mut said = story.said.iter().peekable();
         let mut channels = part.channels.into_iter().peekable();
         for observed in &story.observed {
             let at = observed.at;
+            self.found(at)?;
             while let Some(said) = said.next_if(|said| said.at() <= at) {
                 self.said(said)?;
             }
@@ -428,11 +448,7 @@ impl Writer for Ulog {
         for (at, fields) in channels {
             self.put((Topic::RadioControl, 0), at, &Fields(fields))?;
         }
-        said.try_for_each(|said| self.said(said))?;
-        part.findings.iter().try_for_each(|finding| {
-            let severity = if finding.level == hums_core::health::Level::Critical { 2 } else { 4 };
-            self.text(finding.at, severity, &format!("HUMS: {}", finding_words(finding)))
-        })
+        said.try_for_each(|said| self.said(said))
     }
 
     /// A dropout of at most 65 s: its length has 16 bits.
@@ -447,6 +463,7 @@ impl Writer for Ulog {
     }
 
     fn finish(mut self, _: &Context, _: Totals) -> Result<Finished> {
+        self.found(Instant::from_micros(u64::MAX))?;
         let head = self.head();
         self.file.write(&head)?;
         self.data.copy(&mut self.file)?;
