@@ -263,10 +263,16 @@ impl Share {
 
     /// The lines that the user gets.
     fn told(&self, args: &ShareRequest) -> Vec<String> {
+        let times = if self.seen.contains_key(OBSERVATIONS) {
+            "without times of day; `hums check` may find less in the copy"
+        } else {
+            "times to 2020"
+        };
         let mut lines = vec![
             format!("{}: {} kept", args.output.display(), count(self.kept, "message")),
-            "moved: places to the Atlantic, altitudes to sea level, pressure to 1013.25 hPa, times to 2020"
-                .to_owned(),
+            format!(
+                "moved: places to the Atlantic, altitudes to sea level, pressure to 1013.25 hPa, {times}"
+            ),
         ];
         lines.extend(self.removed.iter().map(|(what, number)| {
             // A field is in as many messages as there are of its name.
