@@ -8,12 +8,10 @@ pub struct Unreadable;
 
 /// An item that outlives power.
 ///
-/// A later version only appends fields. An earlier one ignores them; fields that an older item lacks stay as they are by default.
+/// A later version only appends fields, which an earlier one ignores.
 pub trait Item: Default {
     /// The stored form's version, from 1.
     const VERSION: u8;
-    /// The earliest version that can be read.
-    const OLDEST: u8 = 1;
     /// Bytes of the stored form at most.
     const BYTES: usize;
     /// Whether numbers take only as many bytes as they need.
@@ -34,13 +32,13 @@ pub trait Item: Default {
         fields.at
     }
 
-    /// Reads the stored form, of this version or a later one, or of an earlier one from [`Self::OLDEST`] on.
+    /// Reads the stored form, of this version or a later one.
     ///
     /// # Errors
-    /// [`Unreadable`] if it ends too early, or has an unknown version.
+    /// [`Unreadable`] if it ends too early, or has an earlier version.
     fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
         let mut item = Self::default();
-        let mut fields = Fields::read(stored, Self::OLDEST, Self::VERSION)?;
+        let mut fields = Fields::read(stored, Self::VERSION)?;
         fields.short = Self::SHORT;
         item.fields(&mut fields)?;
         Ok(item)
@@ -57,8 +55,6 @@ pub struct Fields<'a> {
     way: Way<'a>,
     pub(crate) at: usize,
     pub(crate) short: bool,
-    /// An earlier version wrote it: fields are missing at its end.
-    lacks: bool,
 }
 
 impl<'a> Fields<'a> {
@@ -66,12 +62,12 @@ impl<'a> Fields<'a> {
         if let Some(first) = out.first_mut() {
             *first = version;
         }
-        Self { way: Way::Write(out), at: 1, short: false, lacks: false }
+        Self { way: Way::Write(out), at: 1, short: false }
     }
 
-    pub(crate) fn read(stored: &'a [u8], oldest: u8, newest: u8) -> Result<Self, Unreadable> {
-        let version = *stored.first().filter(|version| **version >= oldest).ok_or(Unreadable)?;
-        Ok(Self { way: Way::Read(stored), at: 1, short: false, lacks: version < newest })
+    pub(crate) fn read(stored: &'a [u8], version: u8) -> Result<Self, Unreadable> {
+        stored.first().filter(|stored| **stored >= version).ok_or(Unreadable)?;
+        Ok(Self { way: Way::Read(stored), at: 1, short: false })
     }
 
     pub(crate) const fn is_read(&self) -> bool {
@@ -86,10 +82,7 @@ impl<'a> Fields<'a> {
                     place.copy_from_slice(bytes);
                 }
             }
-            Way::Read(stored) if self.lacks && stored.len() == self.at => return Ok(()),
-            Way::Read(stored) => {
-                bytes.copy_from_slice(stored.get(range).ok_or(Unreadable)?);
-            }
+            Way::Read(stored) => bytes.copy_from_slice(stored.get(range).ok_or(Unreadable)?),
         }
         self.at += N;
         Ok(())
@@ -97,7 +90,7 @@ impl<'a> Fields<'a> {
 
     /// A count. The short form is LEB128: seven bits a byte, the lowest first, the last byte with the top bit clear.
     pub(crate) fn count(&mut self, count: &mut u32) -> Result<(), Unreadable> {
-        if !self.short || (self.lacks && self.is_read()) {
+        if !self.short {
             return count.code(self);
         }
         let (reads, mut left, mut value) = (matches!(self.way, Way::Read(_)), *count, 0);

@@ -1,6 +1,5 @@
 //! Exposure: how long each quantity that ages a part stood in which range, in this session and over the airframe's life.
 
-use crate::bytes::{Fields, Item, Unreadable, fields};
 use crate::time::{BootMs, SILENT};
 use crate::units::Celsius;
 use crate::vehicle::Vehicle;
@@ -70,32 +69,6 @@ impl ExposureQuantity {
 
 /// Tenths of a second in each range of each quantity.
 pub(crate) type Tenths = [[u32; BINS]; ExposureQuantity::ALL.len()];
-
-state! {
-    /// Time in ranges of earlier sessions, as it is stored.
-    pub struct Exposure {
-        pub(crate) ranges: Tenths,
-        /// The power-on before which they count.
-        pub(crate) as_of: u32,
-    }
-}
-
-/// Version; tenths of a second in each range of each quantity; since version 2 the power-on.
-impl Item for Exposure {
-    const VERSION: u8 = 2;
-    const BYTES: usize = 165;
-
-    fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
-        fields!(fields: self.ranges, self.as_of);
-        Ok(())
-    }
-}
-
-pub(crate) fn add(sums: &mut Tenths, more: &Tenths) {
-    for (sum, more) in sums.iter_mut().flatten().zip(more.iter().flatten()) {
-        *sum = sum.saturating_add(*more);
-    }
-}
 
 #[cfg(test)]
 mod tests {

@@ -9,7 +9,6 @@ use crate::apart::{apart, made_in_place};
 use crate::battery_cells;
 use crate::component::{COMPONENTS_MAX, Component, ComponentKind};
 use crate::derived::Derived;
-use crate::exposure;
 use crate::figures::{Figures, Quantity};
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::happening::{Happening, Happenings};
@@ -42,8 +41,6 @@ made_in_place! {
         /// Totals of earlier sessions.
         before: Lifetime,
         exceedances: Exceedances,
-        /// The power-on before which the time in ranges of `before` counts.
-        ranges_as_of: u32,
         components: [Component; COMPONENTS_MAX] = [Component::default(); COMPONENTS_MAX],
         /// For each component its subsystem and the used part of its life, percent; one is updated each tick.
         wear: [Option<(Subsystem, f32)>; COMPONENTS_MAX] = [None; COMPONENTS_MAX],
@@ -373,7 +370,6 @@ impl Monitor {
     pub fn lifetime(&self) -> Lifetime {
         let mut totals = self.usage.totals();
         totals.join(&self.before.totals);
-        exposure::add(&mut totals.ranges, &self.before.totals.ranges);
         Lifetime {
             airframe: self.before.airframe,
             boots: self.boots(),

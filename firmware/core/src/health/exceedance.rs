@@ -212,7 +212,7 @@ impl Exceedances {
     /// # Errors
     /// [`Unreadable`] if it ends within an entry, or has no version.
     pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
-        let mut fields = Fields::read(stored, VERSION, VERSION)?;
+        let mut fields = Fields::read(stored, VERSION)?;
         let mut exceedances = Self::default();
         for place in &mut exceedances.entries {
             if fields.is_read() {

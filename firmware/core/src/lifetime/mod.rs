@@ -20,32 +20,26 @@ mod session;
 pub use saving::{EVERY, EVERY_ARMED, Room, Saving};
 pub use session::Session;
 
-use core::ops::Range;
-
 use crate::bytes::{Fields, fields};
 pub use crate::bytes::{Item, Unreadable};
 use crate::component::{COMPONENTS_MAX, Component};
-use crate::exposure::Exposure;
 use crate::health::exceedance::Exceedances;
-use crate::usage::{Form, Totals, UsageCounter};
+use crate::usage::Totals;
 use crate::vehicle::BATTERIES_MAX;
 
 /// The longest item. Each has its own length.
 pub const ITEM_BYTES_MAX: usize = 512;
 
 const _: () = assert!(Lifetime::BYTES <= ITEM_BYTES_MAX && Exceedances::BYTES <= ITEM_BYTES_MAX);
-const _: () = assert!(Exposure::BYTES <= ITEM_BYTES_MAX && Component::BYTES <= ITEM_BYTES_MAX);
-const _: () = assert!(Session::BYTES <= ITEM_BYTES_MAX);
+const _: () = assert!(Component::BYTES <= ITEM_BYTES_MAX && Session::BYTES <= ITEM_BYTES_MAX);
 
-/// The kind of a stored item. The numbers are stored and never change meaning; 2 is retired.
+/// The kind of a stored item. The numbers are stored and never change meaning; 2 and 4 are retired; a store that has them keeps them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ItemKey {
     /// 1: [`Lifetime`].
     Lifetime,
     /// 3: [`Exceedances`].
     Exceedances,
-    /// 4: [`Exposure`].
-    Exposure,
     /// 16 to 23: a [`Component`], by its place from 0.
     Component(u8),
     /// 24: a [`Session`], saved after and restored after all others: it is added to them.
@@ -55,8 +49,8 @@ pub enum ItemKey {
 impl ItemKey {
     /// All keys, by number.
     pub fn all() -> impl Iterator<Item = Self> {
-        let first = [Self::Lifetime, Self::Exceedances, Self::Exposure].into_iter();
-        first.chain((0..COMPONENTS_MAX as u8).map(Self::Component)).chain([Self::Session])
+        let components = (0..COMPONENTS_MAX as u8).map(Self::Component);
+        [Self::Lifetime, Self::Exceedances].into_iter().chain(components).chain([Self::Session])
     }
 
     /// The stored number.
@@ -64,7 +58,6 @@ impl ItemKey {
         match self {
             Self::Lifetime => 1,
             Self::Exceedances => 3,
-            Self::Exposure => 4,
             Self::Component(place) => 16 + place,
             Self::Session => 24,
         }
@@ -125,43 +118,14 @@ state! {
     }
 }
 
-/// Counters of version 1: the first of [`UsageCounter::ALL`]. Those of later versions stand at the item's end.
-const COUNTERS_V1: usize = 32;
-
-fn counters(totals: &mut Totals, places: Range<usize>, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
-    for counter in &UsageCounter::ALL[places] {
-        let mut value = totals.raw(*counter);
-        fields.counter(counter.form(), &mut value)?;
-        totals.set(*counter, value);
-    }
-    Ok(())
-}
-
-fn motors(totals: &mut Totals, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
-    let revolutions = if fields.short { Form::Count } else { Form::Amount };
-    fields.list(
-        &mut totals.motors,
-        |motor| motor.seconds > 0.0,
-        |fields, motor| {
-            fields.counter(Form::Tenths, &mut motor.seconds)?;
-            fields.counter(revolutions, &mut motor.revolutions)
-        },
-    )
-}
-
-/// Version, system id, unique id, boots, sessions; counters by their [`Form`]; seconds and revolutions of each motor.
-/// Since version 2: the counters after the first 32, and the cells of each battery.
+/// Version, system id, unique id, boots, sessions, cells of each battery, totals.
 impl Item for Lifetime {
-    const VERSION: u8 = 2;
-    const BYTES: usize = 314;
+    const VERSION: u8 = 3;
+    const BYTES: usize = 479;
 
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
         let Self { airframe, boots, sessions, cells, totals } = self;
-        fields!(fields: airframe.system, airframe.uid, boots, sessions);
-        counters(totals, 0..COUNTERS_V1, fields)?;
-        motors(totals, fields)?;
-        counters(totals, COUNTERS_V1..UsageCounter::ALL.len(), fields)?;
-        fields!(fields: cells);
+        fields!(fields: airframe.system, airframe.uid, boots, sessions, cells, totals);
         Ok(())
     }
 }
@@ -169,7 +133,7 @@ impl Item for Lifetime {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::usage::MotorTotals;
+    use crate::usage::{Form, MotorTotals, UsageCounter};
 
     fn life(cells: [u8; BATTERIES_MAX], value: fn(Form) -> f64, motor: (f64, f64)) -> Lifetime {
         let airframe = Airframe { system: 3, uid: 0x0102_0304_0506_0708 };
@@ -193,7 +157,9 @@ mod tests {
             Form::Amount => 123_456_789.123_456,
             Form::Highest | Form::Lowest => 14.25,
         };
-        life([6, 3, 0, 0], value, (36_000_000.7, 6e9 + 0.001))
+        let mut old = life([6, 3, 0, 0], value, (36_000_000.7, 6e9 + 0.001));
+        old.totals.ranges = [[360_000_000; 8]; 5];
+        old
     }
 
     fn half_an_hour() -> Session {
@@ -244,31 +210,14 @@ mod tests {
     #[test]
     fn what_was_lived_reads_back_to_the_last_digit_and_is_as_long_as_the_sums_say() {
         assert_eq!(reads_back(old()).len(), Lifetime::BYTES);
-        assert_eq!(reads_back(Lifetime::default()).len(), Lifetime::BYTES);
+        reads_back(Lifetime::default());
         assert!(reads_back(half_an_hour()).len() <= Session::BYTES_TYPICAL);
         assert_eq!(stored(longest()).len(), Session::BYTES);
     }
 
     #[test]
-    fn a_published_layout_never_changes_and_what_version_1_did_not_know_is_not_counted() {
-        // Version 2 appends mishaps, and cells.
-        assert_eq!(UsageCounter::ALL.len(), COUNTERS_V1 + 1, "a later version appends its counters");
-        let mut first = stored(old());
-        first.truncate(306);
-        first[0] = 1;
-        assert_eq!(sum(&first), 1_761_518_064);
-        let mut read = Lifetime::decode(&first).expect("version 1 reads");
-        assert_eq!((read.totals.raw(UsageCounter::Mishaps) as u32, read.cells), (0, [0; BATTERIES_MAX]));
-        read.totals.set(UsageCounter::Mishaps, 123_456.0);
-        assert_eq!(Lifetime { cells: old().cells, ..read }, old());
-        let mut first = stored(half_an_hour());
-        first.pop();
-        first[0] = 1;
-        let mut read = Session::decode(&first).expect("version 1 reads");
-        read.totals.set(UsageCounter::Mishaps, 1.0);
-        assert_eq!(read, half_an_hour());
-        first.resize(498, 0);
-        assert_eq!(sum(&first), 2_790_154_667);
+    fn a_layout_never_changes() {
+        assert_eq!((sum(&stored(old())), sum(&stored(half_an_hour()))), (3_972_496_611, 3_526_647_728));
     }
 
     #[test]

@@ -35,7 +35,7 @@ state! {
     /// The items that wait to be saved.
     pub struct Saving {
         /// Items that changed since they were saved, one bit each by [`ItemKey::number`].
-        changed: u32 = Self::bit(ItemKey::Lifetime) | Self::bit(ItemKey::Exposure),
+        changed: u32 = Self::bit(ItemKey::Lifetime),
         /// Of these, the ones whose time has come.
         due: u32,
         next: BootMs = BootMs::from_millis(FIRST.as_millis()),
@@ -111,7 +111,7 @@ mod tests {
         let first = Some(ItemKey::Lifetime);
         assert_eq!(saving.due(BootMs::from_millis(10_000), false, Room::Enough), first);
         assert_eq!(saving.due(BootMs::from_millis(10_050), false, Room::Enough), first, "until it is saved");
-        assert_eq!(take(&mut saving, 11, false), [ItemKey::Lifetime, ItemKey::Exposure]);
+        assert_eq!(take(&mut saving, 11, false), [ItemKey::Lifetime]);
         saving.change(ItemKey::Exceedances);
         saving.hurry(ItemKey::Component(3));
         assert_eq!(take(&mut saving, 20, false), [ItemKey::Component(3)]);

@@ -6,26 +6,21 @@
 //! power fails while items are saved. An item that was not saved again gets the session added; one that was saved
 //! includes it.
 //!
-//! Layout, version 1:
+//! Layout:
 //!
 //! - version, power-on (u32), whether the airframe was heard (u8);
-//! - counters in the order of [`UsageCounter::ALL`]: times in tenths of a second, counts and half cycles as LEB128,
-//!   amounts and extremes as f32;
+//! - counters in the order of [`crate::usage::UsageCounter::ALL`]: times in tenths of a second, counts and half cycles as LEB128, amounts and
+//!   extremes as f32;
 //! - number of motors, and of each tenths of a second and whole revolutions (LEB128 of u32);
-//! - number of batteries, and the cycles of each (f32);
-//! - time in ranges: a bit for each range that was entered (5 bytes), and of these tenths of a second (LEB128).
-//!
-//! Version 2 appends the newer counters in the same form.
+//! - time in ranges: a bit for each range that was entered (5 bytes), and of these tenths of a second (LEB128);
+//! - number of batteries, and the cycles of each (f32).
 //!
 //! A quad with four ESCs has some 155 bytes after half an hour; the maximum is
 //! [`Session::BYTES`](super::Item::BYTES).
 
-use super::{COUNTERS_V1, Item, Lifetime, Unreadable, counters, motors};
+use super::{Item, Lifetime, Unreadable};
 use crate::bytes::{Fields, fields};
-use crate::exposure::{BINS, ExposureQuantity};
-use crate::usage::{Form, Totals, UsageCounter};
-
-const RANGE_BYTES: usize = (BINS * ExposureQuantity::ALL.len()).div_ceil(8);
+use crate::usage::{Form, Totals};
 
 /// A session as it was stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -44,32 +39,20 @@ impl Session {
 }
 
 impl Item for Session {
-    const VERSION: u8 = 2;
+    const VERSION: u8 = 3;
     const BYTES: usize = 503;
     const SHORT: bool = true;
 
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
         let Self { boots, heard, totals } = self;
         let mut was_heard = u8::from(*heard);
-        fields!(fields: boots, was_heard);
+        fields!(fields: boots, was_heard, totals);
         *heard = was_heard != 0;
-        counters(totals, 0..COUNTERS_V1, fields)?;
-        motors(totals, fields)?;
         fields.list(
             &mut totals.battery_cycles,
             |cycles| *cycles > 0.0,
             |fields, cycles| fields.counter(Form::Amount, cycles),
-        )?;
-        let mut entered = [0_u8; RANGE_BYTES];
-        for (place, _) in totals.ranges.iter().flatten().enumerate().filter(|(_, tenths)| **tenths > 0) {
-            entered[place / 8] |= 1 << (place % 8);
-        }
-        fields!(fields: entered);
-        let ranges = totals.ranges.iter_mut().flatten().enumerate();
-        ranges
-            .filter(|(place, _)| entered[place / 8] & 1 << (place % 8) != 0)
-            .try_for_each(|(_, tenths)| fields.count(tenths))?;
-        counters(totals, COUNTERS_V1..UsageCounter::ALL.len(), fields)
+        )
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::Monitor;
 use crate::component::Component;
-use crate::exposure::{self, Exposure};
 use crate::flight::FlightEvent;
 use crate::happening::Happening;
 use crate::health::exceedance::Exceedances;
@@ -26,9 +25,8 @@ impl Monitor {
             self.happenings.push(Happening::OtherAirframe);
             self.before = Lifetime { boots: self.before.boots, ..Lifetime::default() };
             self.exceedances.forget_life();
-            for key in [ItemKey::Lifetime, ItemKey::Exceedances, ItemKey::Exposure] {
-                self.saving.hurry(key);
-            }
+            self.saving.hurry(ItemKey::Lifetime);
+            self.saving.hurry(ItemKey::Exceedances);
         }
         let airframe = self.before.airframe.learn(seen);
         if airframe != self.before.airframe {
@@ -50,18 +48,12 @@ impl Monitor {
     pub fn restore(&mut self, key: ItemKey, stored: &[u8]) -> Result<(), Unreadable> {
         match key {
             ItemKey::Lifetime => {
-                let ranges = self.before.totals.ranges;
                 self.before = Lifetime::decode(stored)?;
-                self.before.totals.ranges = ranges;
                 for (battery, count) in self.before.cells.into_iter().enumerate() {
                     self.derived.cells.remember(battery, count);
                 }
             }
             ItemKey::Exceedances => self.exceedances = Exceedances::decode(stored)?,
-            ItemKey::Exposure => {
-                let Exposure { ranges, as_of } = Exposure::decode(stored)?;
-                (self.before.totals.ranges, self.ranges_as_of) = (ranges, as_of);
-            }
             ItemKey::Component(place) => {
                 let component = Component::decode(stored)?;
                 *self.components.get_mut(usize::from(place)).ok_or(Unreadable)? = component;
@@ -69,9 +61,6 @@ impl Monitor {
             ItemKey::Session => {
                 let session = Session::decode(stored)?;
                 self.before.add(&session);
-                if session.boots == self.ranges_as_of {
-                    exposure::add(&mut self.before.totals.ranges, &session.totals.ranges);
-                }
                 self.components
                     .iter_mut()
                     .for_each(|component| component.add(session.boots, &session.totals));
@@ -97,7 +86,6 @@ impl Monitor {
         match key {
             ItemKey::Lifetime => Lifetime { boots, ..self.before }.encode(out),
             ItemKey::Exceedances => self.exceedances.encode(self.usage.until(), out),
-            ItemKey::Exposure => Exposure { ranges: self.before.totals.ranges, as_of: boots }.encode(out),
             ItemKey::Component(place) => {
                 let component = self.components.get(usize::from(place)).copied().unwrap_or_default();
                 Component { as_of: boots, ..component }.encode(out)

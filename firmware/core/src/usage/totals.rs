@@ -1,9 +1,12 @@
 //! Sums, maxima and minima of all counters, of one session or of many.
 
 use super::counters::{Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter, exposure_number};
-use crate::exposure::{ExposureQuantity, Tenths};
+use crate::bytes::{Field, Fields, Unreadable};
+use crate::exposure::{BINS, ExposureQuantity, Tenths};
 use crate::observation::MOTORS_MAX;
 use crate::vehicle::BATTERIES_MAX;
+
+const RANGE_BYTES: usize = (BINS * ExposureQuantity::ALL.len()).div_ceil(8);
 
 state! {
     /// Run time and revolutions of one motor.
@@ -86,8 +89,7 @@ impl Totals {
         }
     }
 
-    /// Adds the counters of vehicle and motors of another session. Time in ranges has an item of its own
-    /// ([`crate::exposure::Exposure`]), and cycles are those of components.
+    /// Adds the counters of another session, except the cycles of batteries: these are of components.
     pub fn join(&mut self, other: &Self) {
         for counter in UsageCounter::ALL {
             let value = other.raw(*counter);
@@ -100,6 +102,36 @@ impl Totals {
             motor.seconds += other.seconds;
             motor.revolutions += other.revolutions;
         }
+        for (sum, other) in self.ranges.iter_mut().flatten().zip(other.ranges.iter().flatten()) {
+            *sum = sum.saturating_add(*other);
+        }
+    }
+}
+
+/// Counters by their [`Form`]; seconds and revolutions of each motor; a bit for each range that was entered, then the tenths of a second of each marked range.
+impl Field for Totals {
+    fn code(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
+        for (counter, value) in UsageCounter::ALL.iter().zip(&mut self.counters) {
+            fields.counter(counter.form(), value)?;
+        }
+        let revolutions = if fields.short { Form::Count } else { Form::Amount };
+        fields.list(
+            &mut self.motors,
+            |motor| motor.seconds > 0.0,
+            |fields, motor| {
+                fields.counter(Form::Tenths, &mut motor.seconds)?;
+                fields.counter(revolutions, &mut motor.revolutions)
+            },
+        )?;
+        let mut entered = [0_u8; RANGE_BYTES];
+        for (place, _) in self.ranges.iter().flatten().enumerate().filter(|(_, tenths)| **tenths > 0) {
+            entered[place / 8] |= 1 << (place % 8);
+        }
+        entered.code(fields)?;
+        let ranges = self.ranges.iter_mut().flatten().enumerate();
+        ranges
+            .filter(|(place, _)| entered[place / 8] & 1 << (place % 8) != 0)
+            .try_for_each(|(_, tenths)| fields.count(tenths))
     }
 }
 

@@ -30,8 +30,7 @@
 //! # How long a sector lasts
 //! | item | bytes in the flash | how often |
 //! |---|---|---|
-//! | lifetime | 320 | once a power-on |
-//! | exposure | 180 | once a power-on |
+//! | lifetime | 490 at most | once a power-on |
 //! | a component | 78 | once a power-on |
 //! | the session's counters, of a quad | 170 | in flight every two minutes, after an hour every thirtieth of the time; twice at the end of a flight |
 //! | times of signatures | 40 | with a key: at first every two minutes, later every thirtieth of the time since power-on, every ten minutes at most; not out of the reserve |
