@@ -668,8 +668,6 @@ pub enum Observation {
     Processor(Processor),
     /// `AUTOPILOT_VERSION`
     Identity(AutopilotIdentity),
-    /// `MISSION_CURRENT`: the item in work.
-    MissionCurrent(u16),
     /// `MISSION_ITEM_REACHED`
     MissionReached(u16),
     /// `COMMAND_ACK`
@@ -680,13 +678,6 @@ pub enum Observation {
     Failing(Causes),
     /// `PARAM_VALUE` of a parameter that is in [`crate::battery_cells::KNOWN`], by its place there, and its value.
     Parameter(u8, f32),
-    /// `FLIGHT_INFORMATION`: the number of the flight and its take-off, milliseconds since boot (0 not yet).
-    FlightInformation {
-        /// The flight's unique number.
-        flight: u64,
-        /// Milliseconds since the autopilot's boot; 0 before take-off.
-        takeoff_boot_ms: u32,
-    },
 }
 
 impl Observation {

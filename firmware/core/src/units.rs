@@ -7,15 +7,12 @@ pub const GRAVITY: f32 = 9.806_65;
 pub(crate) const DEGREE_M: f64 = 111_320.0;
 
 macro_rules! units {
-    ($($(#[$doc:meta])* $name:ident, $symbol:literal $(, $max:expr)?;)*) => {$(
+    ($($(#[$doc:meta])* $name:ident $(= $max:expr)?;)*) => {$(
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
         pub struct $name(pub f32);
 
         impl $name {
-            /// The unit's symbol as findings and reports print it.
-            pub const SYMBOL: &'static str = $symbol;
-
             $(
                 /// Greater values, in either direction, are garbage: no vehicle here reaches them.
                 pub const MAX: f32 = $max;
@@ -35,32 +32,32 @@ macro_rules! units {
 }
 
 units! {
-    /// Electric potential.
-    Volts, "V", 1_000.0;
-    /// Electric current.
-    Amperes, "A", 10_000.0;
-    /// Electric charge.
-    AmpereHours, "Ah";
-    /// Temperature.
-    Celsius, "degC", 1_000.0;
-    /// Length.
-    Metres, "m", 100_000.0;
-    /// Speed.
-    MetresPerSecond, "m/s", 1_000.0;
-    /// Acceleration. No autopilot's sensor measures more than 32 g an axis.
-    MetresPerSecond2, "m/s2", 60.0 * GRAVITY;
-    /// Angle.
-    Radians, "rad";
-    /// Angular speed.
-    RadiansPerSecond, "rad/s", 60.0;
+    /// Electric potential, V.
+    Volts = 1_000.0;
+    /// Electric current, A.
+    Amperes = 10_000.0;
+    /// Electric charge, Ah.
+    AmpereHours;
+    /// Temperature, degC.
+    Celsius = 1_000.0;
+    /// Length, m.
+    Metres = 100_000.0;
+    /// Speed, m/s.
+    MetresPerSecond = 1_000.0;
+    /// Acceleration, m/s2. No autopilot's sensor measures more than 32 g an axis.
+    MetresPerSecond2 = 60.0 * GRAVITY;
+    /// Angle, rad.
+    Radians;
+    /// Angular speed, rad/s.
+    RadiansPerSecond = 60.0;
     /// Revolutions a minute; negative is reverse.
-    Rpm, "rpm", 1e6;
-    /// Pressure.
-    Hectopascals, "hPa";
-    /// Magnetic flux density: the earth's is 0.25 to 0.65.
-    Gauss, "G";
+    Rpm = 1e6;
+    /// Pressure, hPa.
+    Hectopascals;
+    /// Magnetic flux density, G: the earth's is 0.25 to 0.65.
+    Gauss;
     /// A part of the whole: 1 is all of it.
-    Fraction, "1";
+    Fraction;
 }
 
 /// A position on the WGS 84 ellipsoid in degrees; double precision, because single is 1 m at best.

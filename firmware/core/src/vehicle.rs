@@ -341,9 +341,7 @@ impl Vehicle {
             | Observation::SpeedSensors(_)
             | Observation::SecondEstimate(_)
             | Observation::Outputs(_)
-            | Observation::MissionCurrent(_)
             | Observation::Parameter(..)
-            | Observation::FlightInformation { .. }
             | Observation::Shock(_) => {}
         }
     }

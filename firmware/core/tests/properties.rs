@@ -113,7 +113,7 @@ impl Random {
     }
 
     fn rare(&mut self) -> Observation {
-        match self.below(9) {
+        match self.below(8) {
             0 => Observation::Identity(AutopilotIdentity { uid: self.below(3), firmware: self.any() }),
             1 => Observation::CommandAck(CommandAck { command: self.pick(&[20, 21]), ..self.any() }),
             2 => Observation::MissionReached(self.any()),
@@ -121,8 +121,7 @@ impl Random {
             4 => Observation::ClimbWanted(self.any()),
             5 => Observation::SecondEstimate(self.any()),
             6 => Observation::AttitudeSetpoint(self.any()),
-            7 => Observation::Shock(self.any()),
-            _ => Observation::FlightInformation { flight: self.next(), takeoff_boot_ms: self.any() },
+            _ => Observation::Shock(self.any()),
         }
     }
 

@@ -44,9 +44,6 @@ fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
         ids::LOCAL_POSITION_NED => Observation::LocalPosition(motion::local_position(payload)?),
         ids::GLOBAL_POSITION_INT => Observation::GlobalPosition(motion::global_position(payload)?),
         ids::SERVO_OUTPUT_RAW => Observation::Outputs(motion::outputs(payload)),
-        ids::MISSION_CURRENT => {
-            Observation::MissionCurrent(read::<ap::MISSION_CURRENT_DATA>(payload, &[4])?.seq)
-        }
         ids::MISSION_ITEM_REACHED => {
             Observation::MissionReached(read::<ap::MISSION_ITEM_REACHED_DATA>(payload, &[])?.seq)
         }
@@ -74,7 +71,6 @@ fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
         ids::VIBRATION => Observation::Vibration(motion::vibration(payload)?),
         ids::EXTENDED_SYS_STATE => system::landed(payload),
         ids::STATUSTEXT => Observation::Alert(alert_of_text(payload)?),
-        ids::FLIGHT_INFORMATION => system::flight_information(payload)?,
         ids::ESC_INFO => Observation::Escs(propulsion::esc_info(payload)?),
         ids::ESC_STATUS => Observation::Escs(propulsion::esc_status(payload)?),
         ids::RAW_RPM => Observation::SpeedSensors(propulsion::raw_rpm(payload)?),

@@ -123,13 +123,6 @@ pub(super) fn landed(payload: &[u8]) -> Observation {
     Observation::Landed(landed, vtol)
 }
 
-/// The fields are named utc and hold the time since boot; 0 is not yet.
-pub(super) fn flight_information(payload: &[u8]) -> Option<Observation> {
-    let information = read::<ap::FLIGHT_INFORMATION_DATA>(payload, &[])?;
-    let takeoff_boot_ms = (information.takeoff_time_utc / 1_000).min(u64::from(u32::MAX)) as u32;
-    Some(Observation::FlightInformation { flight: information.flight_uuid, takeoff_boot_ms })
-}
-
 /// A parameter about the batteries' cells. PX4 sends an integer's bits, `ArduPilot` its value: none of these values
 /// is as small as a small integer's bits read as a float.
 pub(super) fn parameter(payload: &[u8]) -> Option<Observation> {

@@ -97,8 +97,6 @@ pub(super) struct System {
     /// `MAV_SYS_ID`.
     pub(super) number: Option<u8>,
     pub(super) type_number: Option<u8>,
-    /// `COM_FLIGHT_UUID`
-    pub(super) flight: Option<u64>,
     /// 0 unknown.
     pub(super) release: u32,
     pub(super) status: Option<Status>,
@@ -128,7 +126,6 @@ pub(super) struct Status {
     pub(super) type_number: u8,
     pub(super) hil: bool,
     pub(super) calibrating: bool,
-    pub(super) takeoff_us: Option<u64>,
     pub(super) sensors: Option<Sensors>,
 }
 

@@ -8,7 +8,7 @@ use hums_core::units::Rpm;
 
 use super::state::{MEDIUM_US, Px4, Report, Sample, Status, System, Topic, topic};
 
-const VEHICLE_STATUS: &str = "arming_state nav_state failsafe system_type hil_state takeoff_time onboard_control_sensors_present \
+const VEHICLE_STATUS: &str = "arming_state nav_state failsafe system_type hil_state onboard_control_sensors_present \
     onboard_control_sensors_enabled onboard_control_sensors_health calibration_enabled \
     nav_state_user_intention";
 const ACTUATOR_ARMED: &str = "armed lockdown kill termination manual_lockdown force_failsafe";
@@ -32,7 +32,7 @@ pub(super) const TOPICS: &[Topic] = &[
     topic("input_rc", 1, MEDIUM_US, "rssi channel_count", rc),
     topic("radio_status", 1, 0, "rssi remote_rssi noise remote_noise rxerrors", radio),
     topic("telemetry_status", 4, 0, "rssi remote_rssi noise remote_noise rxerrors type", telemetry),
-    topic("mission_result", 1, 0, "seq_current seq_reached", mission),
+    topic("mission_result", 1, 0, "seq_reached", mission),
     topic("vehicle_command_ack", 4, 0, "command result", ack),
     topic("event", 1, 0, "id log_levels arguments", event),
     topic("log_message", 1, 0, "severity text", log_message),
@@ -74,7 +74,6 @@ impl System {
         match name {
             "MAV_SYS_ID" => self.number = Some(value as u8).filter(|number| *number > 0),
             "MAV_TYPE" => self.type_number = Some(value as u8),
-            "COM_FLIGHT_UUID" => self.flight = Some(value.max(0.0) as u64),
             _ => {}
         }
     }
@@ -192,7 +191,7 @@ pub fn nav_state(mode: u32) -> Option<u8> {
 fn status(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     let bits = |field| Some(fields.count(field)? as u32);
-    let sensors = || Some(Sensors::of(bits(6)?, bits(7)?, bits(8)?));
+    let sensors = || Some(Sensors::of(bits(5)?, bits(6)?, bits(7)?));
     let before = px4.system.status;
     let status = Status {
         arming: fields.byte(0).unwrap_or(0),
@@ -200,10 +199,9 @@ fn status(px4: &mut Px4, sample: &Sample<'_>) {
         failsafe: fields.flag(2),
         type_number: fields.byte(3).unwrap_or(0),
         hil: fields.flag(4),
-        takeoff_us: fields.count(5),
         sensors: sensors(),
-        calibrating: fields.flag(9),
-        meant: fields.byte(10),
+        calibrating: fields.flag(8),
+        meant: fields.byte(9),
     };
     px4.system.status = Some(status);
     px4.failsafes();
@@ -276,11 +274,7 @@ fn telemetry(px4: &mut Px4, sample: &Sample<'_>) {
 }
 
 fn mission(px4: &mut Px4, sample: &Sample<'_>) {
-    let fields = &sample.fields;
-    if let Some(current) = fields.count(0) {
-        px4.observe(Observation::MissionCurrent(current as u16));
-    }
-    let reached = fields.get(1).map(|number| number as i64);
+    let reached = sample.fields.get(0).map(|number| number as i64);
     if reached != px4.system.reached {
         px4.system.reached = reached;
         if let Some(reached) = reached.and_then(|reached| u16::try_from(reached).ok()) {
@@ -368,10 +362,5 @@ impl Px4 {
         let boot_ms = (recorded_us / 1_000) as u32;
         let utc_micros = self.system.utc_offset_us.map(|offset| offset.saturating_add(recorded_us));
         self.observe(Observation::SystemTime(SystemTime { utc_micros, boot_ms }));
-        if let Some(takeoff_us) = self.system.status.and_then(|status| status.takeoff_us) {
-            let takeoff_boot_ms = (takeoff_us / 1_000).min(u64::from(u32::MAX)) as u32;
-            let flight = self.system.flight.unwrap_or(0);
-            self.observe(Observation::FlightInformation { flight, takeoff_boot_ms });
-        }
     }
 }
