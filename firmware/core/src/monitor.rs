@@ -19,7 +19,6 @@ use crate::lifetime::{ItemKey, Lifetime, Saving};
 use crate::observation::{Feeds, Observation, Source};
 use crate::parameters::{Param, Params};
 use crate::protect::{Protect, Request};
-use crate::snapshot::{Snapshot, Snapshots};
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::{BootMs, Millis};
 use crate::usage::{Usage, UsageCounter, figure_number};
@@ -46,7 +45,6 @@ made_in_place! {
         wear: [Option<(Subsystem, f32)>; COMPONENTS_MAX] = [None; COMPONENTS_MAX],
         wear_next: u8,
         figures: Figures,
-        snapshots: Snapshots,
         protect: Protect,
         saving: Saving,
         happenings: Happenings,
@@ -160,11 +158,9 @@ impl Monitor {
         };
         self.figures.step(&inputs, event);
         self.usage.step(&inputs, event);
-        self.snapshots.step(&inputs);
         let mut crossed = false;
         self.health.step(&inputs, &mut self.exceedances, &mut |finding| {
             crossed = true;
-            self.snapshots.trigger(finding);
             findings(finding);
         });
         if crossed || self.exceedances.lasting() {
@@ -407,11 +403,6 @@ impl Monitor {
     /// Events without a place since the last call.
     pub const fn take_happenings_lost(&mut self) -> u16 {
         core::mem::replace(&mut self.happenings.lost, 0)
-    }
-
-    /// Half of a snapshot around a critical finding, each once.
-    pub fn take_snapshot(&mut self, now: BootMs) -> Option<Snapshot<'_>> {
-        self.snapshots.take(now)
     }
 
     /// The protective action to request from the autopilot now, once.

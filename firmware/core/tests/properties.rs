@@ -305,9 +305,6 @@ fn check(monitor: &mut Monitor, now: BootMs) {
         assert!(matches!(overall, Level::Stale | Level::Critical), "{overall:?}");
     }
     while monitor.take_happening().is_some() {}
-    while let Some(snapshot) = monitor.take_snapshot(now) {
-        let _ = snapshot.values().count();
-    }
     let _ = monitor.take_request();
     while let Some(key) = monitor.save_due(now, Room::Enough) {
         let mut item = [0; ITEM_BYTES_MAX];

@@ -6,7 +6,6 @@ use hums_core::component::{COMPONENTS_MAX, Label};
 use hums_core::health::Level;
 use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Room};
 use hums_core::parameters::{Params, TABLE};
-use hums_core::snapshot::{COLUMNS_MAX, SAMPLES};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::BootMs;
 use hums_core::usage::FIGURE_FIRST;
@@ -79,9 +78,6 @@ fn look(monitor: &mut Monitor, now: BootMs) {
     monitor.for_each_counter(sane);
     monitor.lifetime().totals.for_each(sane);
     while monitor.take_happening().is_some() {}
-    while let Some(snapshot) = monitor.take_snapshot(now) {
-        assert!(snapshot.values().count() <= SAMPLES * COLUMNS_MAX);
-    }
     let _ = monitor.take_request();
     for exceedance in monitor.exceedances().iter(now) {
         assert!(exceedance.lifetime.warnings >= exceedance.session.warnings);

@@ -119,7 +119,6 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         Record::Exceedance(exceedance) => wear::exceedance(exceedance),
         Record::Component(component) => vec![wear::component(component)],
         Record::Keep(_) | Record::Mark(_) => extent_rows(record),
-        Record::Snapshot(snapshot) => wear::snapshot(snapshot),
         Record::Protection(protection) => one(
             "HUMS_PROTECTION",
             vec![

@@ -1,7 +1,7 @@
-//! Wear records as rows: `HUMS_LIFETIME`, `HUMS_EXCEEDANCE`, `HUMS_COMPONENT`; and `HUMS_SNAPSHOT`.
+//! Wear records as rows: `HUMS_LIFETIME`, `HUMS_EXCEEDANCE`, `HUMS_COMPONENT`.
 
 use hums_analysis::log_json::finite;
-use hums_blackbox::record::{Component, Exceedance, Lifetime, Snapshot};
+use hums_blackbox::record::{Component, Exceedance, Lifetime};
 
 use serde::Serialize;
 
@@ -101,20 +101,4 @@ pub(super) fn component(component: &Component<'_>) -> Row {
         ("by", Cell::Text(by)),
     ];
     Row::new("HUMS_COMPONENT", cells)
-}
-
-pub(super) fn snapshot(snapshot: &Snapshot<'_>) -> Vec<Row> {
-    let row = |(at, quantity, value): (_, Option<&str>, _)| {
-        let cells = vec![
-            ("finding_at[s]", Cell::Time(snapshot.at)),
-            ("check", Cell::Text(snapshot.check.to_owned())),
-            ("instance", Cell::Count(u64::from(snapshot.instance))),
-            ("half", Cell::Text(if snapshot.after { "after" } else { "before" }.to_owned())),
-            ("at[s]", Cell::Time(at)),
-            ("quantity", Cell::Text(quantity.unwrap_or("unknown").to_owned())),
-            ("value", Cell::Single(value)),
-        ];
-        Row::new("HUMS_SNAPSHOT", cells)
-    };
-    snapshot.iter().map(row).collect()
 }

@@ -308,8 +308,6 @@ impl Craft {
             keep(history, now, note);
         }
         self.happenings(now, history);
-        // Snapshots are not used here.
-        while self.monitor.take_snapshot(now.into()).is_some() {}
         self.texts.pass(now, &mut |text| say(history, text));
         if let Some(history) = history {
             history.pass(now);

@@ -61,9 +61,6 @@ fn a_mishap_is_on_the_card_within_200_ms_with_its_place_and_told() {
     for _ in 0..60 {
         say(&mut rig, 15.0, IN_AIR);
     }
-    let snapshots = read(&medium).snapshots.into_iter().filter(|(check, _)| check == "tumbling");
-    let halves: Vec<_> = snapshots.map(|(_, after)| after).collect();
-    assert_eq!(halves, [false, true], "the seconds before it and those after it");
     rig.finish_whole(&medium);
 }
 

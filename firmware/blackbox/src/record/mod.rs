@@ -10,7 +10,7 @@ mod finding;
 mod keep;
 mod loss;
 mod mark;
-mod snapshot;
+mod protection;
 mod stored;
 mod usage;
 mod vehicle;
@@ -24,7 +24,7 @@ pub use finding::{Event, FindingRecord, Note};
 pub use keep::Keep;
 pub use loss::{Loss, LossKind, Stats};
 pub use mark::{Mark, MarkReason};
-pub use snapshot::{Protection, Snapshot, SnapshotValues};
+pub use protection::Protection;
 pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage};
 pub use vehicle::{Clock, Parameter, Vehicle};
 pub use wear::{Component, Exceedance, RecordReason};
@@ -113,9 +113,7 @@ records! {
     14 Component(Component<'a>),
     /// The stored part of the session.
     15 Keep(Keep),
-    /// Half of a snapshot around a critical finding.
-    16 Snapshot(Snapshot<'a>),
-    /// A step of the protective action.
+    /// A step of the protective action; 16 is retired.
     17 Protection(Protection),
     /// The log is whole up to here.
     18 Mark(Mark),

@@ -23,7 +23,7 @@ pub(crate) struct Shape {
     pub(crate) version: u8,
     /// Numbers of 4 bytes.
     pub(crate) words: u8,
-    /// Numbers of 2 bytes.
+    /// Numbers of 2 bytes. Only the retired kind 16 had some.
     pub(crate) halves: u8,
 }
 
@@ -52,7 +52,6 @@ impl Shape {
 /// Numbers and bytes, each in order; zeros and empty texts beyond the end.
 pub(crate) struct Fields<'a> {
     words: ByteFields<'a>,
-    halves: &'a [u8],
     bytes: ByteFields<'a>,
 }
 
@@ -70,7 +69,6 @@ impl<'a> Fields<'a> {
         };
         let fields = Self {
             words: ByteFields::new(part(HEAD_BYTES, shape.halves_at())),
-            halves: part(shape.halves_at(), shape.bytes_at()),
             bytes: ByteFields::new(part(shape.bytes_at(), usize::MAX)),
         };
         (shape, fields)
@@ -98,10 +96,6 @@ impl<'a> Fields<'a> {
 
     pub(crate) fn words(&mut self) -> &'a [u8] {
         self.words.bytes(usize::MAX)
-    }
-
-    pub(crate) const fn halves(&self) -> &'a [u8] {
-        self.halves
     }
 
     pub(crate) fn u8(&mut self) -> u8 {
@@ -348,11 +342,6 @@ impl<'a> Sink<'a> {
         self.u64(value.to_bits())
     }
 
-    pub(crate) fn half(&mut self, value: u16) -> &mut Self {
-        self.count(3);
-        self.bytes(&value.to_le_bytes())
-    }
-
     pub(crate) fn u8(&mut self, value: u8) -> &mut Self {
         self.bytes(&[value])
     }
@@ -406,7 +395,7 @@ mod tests {
         let mut stored = [0; 64];
         let mut sink = Sink::new(&mut stored);
         let at = Instant::from_micros(5_000_000_000);
-        sink.head(7).time(at).u32(9).f64(-1.5).half(3).half(4).u8(1).name("abc");
+        sink.head(7).time(at).u32(9).f64(-1.5).u8(1).name("abc");
         let len = sink.len().expect("fits");
         let (shape, mut fields) = Fields::new(&stored[..len]);
         assert_eq!((shape.kind, shape.version, shape.times()), (7, 0x11, 2));
@@ -414,9 +403,8 @@ mod tests {
         // Read in another order than written.
         assert_eq!((fields.u8(), fields.text(), fields.text()), (1, "abc", ""));
         assert_eq!((fields.instant(), fields.u32(), fields.f64(), fields.u32()), (at, 9, -1.5, 0));
-        assert_eq!(fields.halves(), [3, 0, 4, 0]);
         assert_eq!(Shape::read(&stored[..shape.bytes_at() - 1]), None);
         let (_, mut fields) = Fields::new(&stored[..6]);
-        assert_eq!((fields.u32(), fields.halves(), fields.u8()), (0xf200, &[][..], 0));
+        assert_eq!((fields.u32(), fields.u8()), (0xf200, 0));
     }
 }

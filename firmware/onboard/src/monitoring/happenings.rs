@@ -1,6 +1,6 @@
 //! Events for the record.
 
-use hums_blackbox::record::{LossKind, MarkReason, Moment, Protection, Record, Snapshot, SnapshotValues};
+use hums_blackbox::record::{LossKind, MarkReason, Moment, Protection, Record};
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
 use hums_core::mishap::MishapChange;
@@ -59,10 +59,6 @@ pub(super) fn record(now: Instant, book: &mut Logbook<'_>, recorded: &mut Record
     }
     let Logbook { monitor, journal, .. } = book;
     journal.lose(now, LossKind::Records, u64::from(monitor.take_happenings_lost()));
-    while let Some(snapshot) = monitor.take_snapshot(now.into()) {
-        let mut values = SnapshotValues::default();
-        journal.record(now, &Record::Snapshot(Snapshot::new(now, &snapshot, &mut values)));
-    }
 }
 
 fn mishap(now: Instant, change: MishapChange, book: &mut Logbook<'_>, marks: &mut Marks) {

@@ -61,8 +61,6 @@ pub struct Found {
     /// Events' numbers and texts, and reasons of end marks.
     pub events: Vec<(u8, String)>,
     pub marks: Vec<MarkReason>,
-    /// Checks of snapshots, and whether each is from after the finding.
-    pub snapshots: Vec<(String, bool)>,
 }
 
 impl Rig {
@@ -365,9 +363,6 @@ fn take(reader: &mut LogReader, found: &mut Found) {
                 found.events.push((event.number, event.text.to_owned()));
             }
             Item::Record { record: Record::Mark(mark), .. } => found.marks.push(mark.why),
-            Item::Record { record: Record::Snapshot(snapshot), .. } => {
-                found.snapshots.push((snapshot.check.to_owned(), snapshot.after));
-            }
             Item::Record { .. } | Item::End(_) => {}
         }
     }

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use hums_core::half;
+use half::f16;
 
 use super::format::{Field, FieldKind, Format, TimeField};
 
@@ -169,7 +169,7 @@ fn number(kind: FieldKind, bytes: &[u8]) -> Option<f64> {
         FieldKind::U32 => f64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
         FieldKind::I64 => i64::from_le_bytes(*bytes.first_chunk()?) as f64,
         FieldKind::U64 => u64::from_le_bytes(*bytes.first_chunk()?) as f64,
-        FieldKind::Half => f64::from(half::from_bits(u16::from_le_bytes(*bytes.first_chunk()?))),
+        FieldKind::Half => f64::from(f16::from_bits(u16::from_le_bytes(*bytes.first_chunk()?))),
         FieldKind::Single => f64::from(f32::from_le_bytes(*bytes.first_chunk()?)),
         FieldKind::Double => f64::from_le_bytes(*bytes.first_chunk()?),
         FieldKind::CentiI16 => f64::from(i16::from_le_bytes(*bytes.first_chunk()?)) / 100.0,
