@@ -22,7 +22,7 @@ use crate::latest::Reading;
 use crate::mag_heading_residual::{self, CompassUse};
 use crate::motion::{IDLE_THROTTLE, throttle};
 use crate::observation::{Air, Gnss, Imu, Observation, Vibration, VibrationScale};
-use crate::pairs::{Kind, Pairs, SENSORS_MAX};
+use crate::pairs::{Kind, Pairs};
 use crate::rate_tracking::{self, FullThrust, RateSetpoint};
 use crate::residual::{Comparison, Residuals};
 use crate::stuck::Repeats;
@@ -177,15 +177,6 @@ impl Crosschecks {
         if !(idles && self.residuals.gates.are(gates::HOVERS) && vehicle.inertial.is_level(now)) {
             self.repeats.moved.step(now, step_s, vehicle);
         }
-    }
-
-    pub(crate) fn sensors_known(&self) -> u8 {
-        let measured = |sensor: usize| self.pairs.iter().any(|pairs| pairs.has_measured(sensor));
-        (0..SENSORS_MAX).rev().find(|sensor| measured(*sensor)).map_or(0, |last| last as u8 + 1)
-    }
-
-    pub(crate) fn are_compared(&self) -> bool {
-        self.pairs.iter().any(Pairs::are_compared)
     }
 
     /// For how long a sensor has repeated one value in flight, s; 0 if it does not.

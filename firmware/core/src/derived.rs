@@ -116,7 +116,7 @@ impl Derived {
             }
             Observation::Battery(_) => self.take_supply(vehicle, flight, vehicle.told_battery),
             Observation::SystemStatus(_) => {
-                self.take_supply(vehicle, flight, (vehicle.batteries_known() == 0).then_some(0));
+                self.take_supply(vehicle, flight, (!vehicle.has_batteries()).then_some(0));
             }
             Observation::Parameter(place, value) => self.cells.take_setting(*place, *value),
             Observation::Escs(group) => self.motors.take(at, group, vehicle, flight.airborne()),

@@ -98,8 +98,8 @@ impl Pair {
     }
 
     fn excess(&self, now: BootMs, kind: Kind) -> Option<Reading> {
-        let at = self.residual.at.instant(now).filter(|at| now.since(*at) <= PAUSE);
-        Reading::new(at, self.residual.excess(kind.row()))
+        let at = self.residual.at.instant(now).filter(|at| now.since(*at) <= PAUSE)?;
+        Some(Reading { at, value: self.residual.excess(kind.row())? })
     }
 }
 
@@ -136,17 +136,9 @@ impl Pairs {
         self.pairs = [Pair::default(); SENSORS_MAX];
     }
 
-    pub(crate) fn has_measured(&self, sensor: usize) -> bool {
-        self.samples.get(sensor).is_some_and(|sample| sample.at.is_set())
-    }
-
     pub(crate) fn measures(&self, now: BootMs, sensor: usize) -> bool {
         let sample = self.samples.get(sensor);
         sample.is_some_and(|sample| sample.at.age(now).is_some_and(|age| age <= PAUSE))
-    }
-
-    pub(crate) fn are_compared(&self) -> bool {
-        self.pairs.iter().any(|pair| pair.residual.at.is_set())
     }
 
     /// How far a sensor is apart from all others, beyond what is usual; of two, for the second one. Measured when the first of its pairs

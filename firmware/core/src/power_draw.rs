@@ -28,7 +28,7 @@ pub(crate) fn drawn(now: BootMs, vehicle: &Vehicle) -> PowerDraw {
             drawn.add(motor.esc.voltage, motor.esc.current);
         }
     }
-    if vehicle.batteries_known() == 0 {
+    if !vehicle.has_batteries() {
         drawn.each_a[0] = drawn.current_a.unwrap_or(0.0);
     }
     drawn

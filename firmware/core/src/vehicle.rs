@@ -66,11 +66,6 @@ pub(crate) struct Supply {
     pub(crate) remaining: Option<Fraction>,
 }
 
-/// How many places there are up to the last known one.
-pub(crate) fn known(places: impl Iterator<Item = bool>) -> u8 {
-    (1..).zip(places).fold(0, |count, (place, is_known)| if is_known { place } else { count })
-}
-
 state! {
     /// The vehicle as it is known now.
     pub struct Vehicle {
@@ -162,8 +157,8 @@ state! {
 }
 
 impl Vehicle {
-    pub(crate) fn batteries_known(&self) -> u8 {
-        known(self.batteries.iter().map(|slot| slot.get().is_some()))
+    pub(crate) fn has_batteries(&self) -> bool {
+        self.batteries.iter().any(|slot| slot.get().is_some())
     }
 
     /// A battery's own figures. Those of the autopilot are the first battery's while none reports itself: with several they are

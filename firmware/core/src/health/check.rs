@@ -26,7 +26,6 @@ use crate::bytes::fnv1a;
 use crate::latest::Reading;
 use crate::parameters::{Param, Params};
 use crate::time::{BootMs, Millis, Stamp};
-use crate::vehicle::known;
 
 /// The bad side of a check's limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,67 +51,17 @@ impl CheckPhase {
     pub(super) const ALL: [Self; 3] = [Self::Always, Self::Armed, Self::InFlight];
 }
 
-/// The parts that an instance's number counts.
+/// Kind of part that the instance numbers count. Two checks with equal kind and instance concern one part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstanceKind {
-    /// A single one, or parts without numbers: each instance is read.
+    /// A single one, or parts whose numbers say nothing.
     Vehicle,
-    /// Motors that an ESC reports on.
+    /// Motors.
     Motor,
-    /// Motors by the outputs that drive them.
-    Output,
-    /// Batteries; the first one also by the autopilot's own figures.
-    Supply,
-    /// Batteries that report themselves.
+    /// Batteries.
     Battery,
     /// GNSS receivers.
     Receiver,
-    /// Accelerometers, gyros, compasses and barometers.
-    Sensor,
-    /// Sensors that were compared with another one.
-    Pair,
-}
-
-impl InstanceKind {
-    /// The parts that are numbered; checks of the same parts with the same number are of the same one. `None` if numbers say nothing.
-    pub(super) const fn thing(self) -> Option<Self> {
-        match self {
-            Self::Motor | Self::Output => Some(Self::Motor),
-            Self::Supply | Self::Battery => Some(Self::Battery),
-            Self::Receiver => Some(Self::Receiver),
-            Self::Vehicle | Self::Sensor | Self::Pair => None,
-        }
-    }
-}
-
-pub(super) struct Reported([u8; InstanceKind::Pair as usize + 1]);
-
-impl Reported {
-    pub(super) fn of(inputs: &Inputs<'_>) -> Self {
-        let Inputs { vehicle, derived, .. } = inputs;
-        let batteries = vehicle.batteries_known();
-        let motors = vehicle.motors.iter().map(|motor| motor.moved_at.or(motor.state_at).is_some());
-        let both = vehicle.gnss.iter().zip(&vehicle.gnss_integrity);
-        let receivers = both.map(|(gnss, integrity)| gnss.at().or(integrity.at()).is_some());
-        let sensors = derived.crosschecks.sensors_known();
-        let mut counts = [u8::MAX; _];
-        for (kind, count) in [
-            (InstanceKind::Motor, known(motors)),
-            (InstanceKind::Output, if derived.motors.outputs.at.is_set() { u8::MAX } else { 0 }),
-            (InstanceKind::Supply, batteries.max(1)),
-            (InstanceKind::Battery, batteries),
-            (InstanceKind::Receiver, known(receivers)),
-            (InstanceKind::Sensor, sensors),
-            (InstanceKind::Pair, if derived.crosschecks.are_compared() { sensors } else { 0 }),
-        ] {
-            counts[kind as usize] = count;
-        }
-        Self(counts)
-    }
-
-    pub(super) const fn count(&self, check: &Check) -> u8 {
-        self.0[check.of as usize]
-    }
 }
 
 /// The unit of a check's value and limits, in a byte.

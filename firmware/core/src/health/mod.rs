@@ -26,7 +26,7 @@ mod vocabulary;
 pub use check::{
     CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, CheckPhase, InstanceKind, Limits, Side, State, Unit,
 };
-use check::{CheckStep, LevelChange, Reported};
+use check::{CheckStep, LevelChange};
 pub use finding::{Finding, Level, Orders, Subsystem};
 pub use inputs::Inputs;
 pub use suppression::{Alarm, Role, explains, is_of_mishap, is_with_mishap, root_cause};
@@ -67,19 +67,17 @@ impl Health {
         exceedances: &mut Exceedances,
         findings: &mut impl FnMut(&Finding),
     ) {
-        let (now, reported) = (Now::of(inputs), Reported::of(inputs));
-        debug_assert_eq!(unreported(&reported, inputs), None, "has a value, though it never reported");
+        let now = Now::of(inputs);
         let mut first = 0;
         for (place, check) in (0..).zip(checks()) {
-            let (how, count) = (now.how(check), reported.count(check));
+            let how = now.how(check);
             for instance in 0..check.instances {
                 let slot = first + usize::from(instance);
                 let Some(state) = self.states.get_mut(slot) else { break };
-                let is_read = how.applies && instance < count;
-                if !is_read && state.is_new() {
+                let reading = if how.applies { (check.read)(inputs, instance) } else { None };
+                if reading.is_none() && state.is_new() {
                     continue;
                 }
-                let reading = if is_read { (check.read)(inputs, instance) } else { None };
                 if !how.quiet && !how.latched {
                     state.held = None;
                 }
@@ -278,14 +276,6 @@ impl Now {
         let how = self.hows[check.when as usize];
         CheckStep { latched: how.latched && !matches!(check.subsystem, Subsystem::Mishap), ..how }
     }
-}
-
-/// A check that has a value of a part that never reported; there must be none.
-fn unreported(reported: &Reported, inputs: &Inputs<'_>) -> Option<&'static str> {
-    let has_more = |check: &&Check| {
-        (reported.count(check)..check.instances).any(|instance| (check.read)(inputs, instance).is_some())
-    };
-    checks().find(has_more).map(|check| check.name)
 }
 
 /// Critical before stale before warning: not knowing is worse than a known warning, and better than a known danger.

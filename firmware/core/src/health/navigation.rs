@@ -48,7 +48,6 @@ const MISMATCH: Check = Check {
     // Never stale: sensors are compared only in conditions where that is valid.
     stale_s: None,
     instances: SENSORS_MAX as u8,
-    of: InstanceKind::Pair,
     read: |inputs, sensor| mismatch(inputs, Kind::Accelerometer, sensor),
     ..ESTIMATOR
 };
@@ -60,7 +59,6 @@ const STUCK: Check = Check {
     limits: Limits::above(Some(Param::StuckWarn), None, 0.0),
     debounce_ms: [0, 1_000],
     alarm_only: true,
-    of: InstanceKind::Sensor,
     read: |inputs, sensor| stuck(inputs, Kind::Accelerometer, sensor),
     ..MISMATCH
 };
@@ -73,7 +71,6 @@ const SECOND: Check = Check {
     // A check that names the faulty sensor comes first.
     debounce_ms: [1_000, 1_000],
     instances: 1,
-    of: InstanceKind::Vehicle,
     read: |inputs, _| residual(inputs, Comparison::Ahrs2Tilt),
     ..MISMATCH
 };
@@ -106,19 +103,19 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_ms: SMOOTHED, read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor)),
     // What shakes the accelerometer shakes the gyro.
     row!("gyro_noise" MISMATCH, above(GyroNoiseWarn _ 0.05), role: Role::of(Group::GyroNoise, VIBRATION),
-        unit: Unit::of("rad/s"), debounce_ms: [2_000, 0], stale_s: STALE, instances: 1, of: InstanceKind::Vehicle,
+        unit: Unit::of("rad/s"), debounce_ms: [2_000, 0], stale_s: STALE, instances: 1,
         read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[_, rate, _]| rate)),
     // It goes by the attitude and a receiver too.
     row!("imu_gps" MISMATCH, above(ImuGpsWarn _ 0.3),
         role: Role::of(Group::ImuGnss, WRONG_RECEIVERS | INERTIAL | VIBRATION), instances: 1,
-        of: InstanceKind::Vehicle, read: |inputs, _| inputs.derived.crosschecks.imu_gnss.residual(inputs.now)),
+        read: |inputs, _| inputs.derived.crosschecks.imu_gnss.residual(inputs.now)),
     row!("compass_mismatch" MISMATCH, above(MagMismWarn _ 5.0),
         role: Role::of(Group::CompassMismatch, Group::CompassFault.bit()), unit: Unit::of("%"),
         debounce_ms: SMOOTHED,
         read: |inputs, sensor| mismatch(inputs, Kind::Compass, sensor)),
     row!("compass_heading" MISMATCH, above(MagHeadWarn _ 3.0),
         role: Role::of(Group::CompassUse, COMPASS | TURNS), unit: Unit::of("deg"),
-        debounce_ms: SMOOTHED, instances: 1, of: InstanceKind::Vehicle,
+        debounce_ms: SMOOTHED, instances: 1,
         read: |inputs, _| residual(inputs, Comparison::MagHeading)),
     row!("baro_mismatch" MISMATCH, above(BaroMismWarn _ 1.0),
         role: Role::of(Group::Sensor, Group::BaroFault.bit()), unit: Unit::of("m"),
@@ -126,14 +123,14 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, sensor| mismatch(inputs, Kind::Barometer, sensor)),
     row!("baro_height" MISMATCH, above(BaroGpsWarn _ 1.0),
         role: Role::of(Group::Sensor, Group::BaroFault.bit() | RECEIVERS), unit: Unit::of("m"),
-        debounce_ms: [1_000, 1_000], instances: 1, of: InstanceKind::Sensor,
+        debounce_ms: [1_000, 1_000], instances: 1,
         read: |inputs, _| residual(inputs, Comparison::BaroGnss)),
     row!("baro_noise" MISMATCH, above(BaroNoiseWarn _ 0.5),
         role: Role::of(Group::Sensor, Group::BaroFault.bit() | Group::ImuGnss.bit()), unit: Unit::of("m"),
-        instances: 1, of: InstanceKind::Sensor, read: |inputs, _| residual(inputs, Comparison::BaroNoise)),
+        instances: 1, read: |inputs, _| residual(inputs, Comparison::BaroNoise)),
     row!("ekf_climb" MISMATCH, above(EkfClimbWarn EkfClimbCrit 1.0),
         role: Role::of(Group::EkfClimb, DISTURBANCES), unit: Unit::of("m/s"), debounce_ms: [500, 500],
-        instances: 1, of: InstanceKind::Sensor, read: |inputs, _| residual(inputs, Comparison::BaroClimb)),
+        instances: 1, read: |inputs, _| residual(inputs, Comparison::BaroClimb)),
     SECOND,
     row!("ahrs2_height" SECOND, above(Ahrs2HgtWarn Ahrs2HgtCrit 1.0), unit: Unit::of("m"),
         read: |inputs, _| residual(inputs, Comparison::Ahrs2Height)),
@@ -149,7 +146,6 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor)),
     // The time depends on the vehicle's movement.
     row!("gps_stuck" STUCK, role: Role::of(Group::GnssFrozen, 0), instances: RECEIVERS_MAX as u8,
-        of: InstanceKind::Vehicle,
         read: |inputs, receiver| inputs.derived.crosschecks.repeats.receiver_stuck(inputs.now, receiver)),
     Check { role: Role::of(Group::GnssQuality, Group::GnssLost.bit()), debounce_ms: RECEIVER_SAYS, ..GNSS },
     row!("gps_sats_fall" GNSS, above(GpsSatsFall _ 5.0),

@@ -14,7 +14,7 @@ const BATTERY: Check = Check {
     debounce_ms: [2_000, 2_000],
     stale_s: STALE_SLOW,
     instances: BATTERIES,
-    of: InstanceKind::Supply,
+    of: InstanceKind::Battery,
     read: |inputs, battery| {
         let supply = inputs.vehicle.supply(battery.into())?;
         Some(Reading { at: supply.at, value: supply.remaining?.0 * 100.0 })
@@ -30,26 +30,25 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, battery| inputs.derived.cell_voltage(inputs.vehicle, inputs.params, battery)),
     row!("cell_deviation" BATTERY, above(CellDevWarn CellDevCrit 0.01),
         role: Role::of(Group::FailsafeCause, 0), unit: Unit::of("V"), debounce_ms: [10_000, 10_000],
-        when: CheckPhase::Armed, of: InstanceKind::Battery, read: |inputs, battery| of(inputs, battery, spread_v)),
+        when: CheckPhase::Armed, read: |inputs, battery| of(inputs, battery, spread_v)),
     // AirData: above the warning's limit for a minute is as bad as far above it.
     row!("cell_dev_lasting" BATTERY, above(_ CellDevWarn 0.01), unit: Unit::of("V"),
-        debounce_ms: [2_000, 60_000], when: CheckPhase::Armed, of: InstanceKind::Battery,
+        debounce_ms: [2_000, 60_000], when: CheckPhase::Armed,
         read: |inputs, battery| of(inputs, battery, spread_v)),
     // A trend holds until the next figure.
     row!("batt_resistance" BATTERY, above(BatResWarn BatResCrit 5.0), debounce_ms: [10_000, 10_000],
-    when: CheckPhase::InFlight, stale_s: None, of: InstanceKind::Battery, read: |inputs, battery| {
+    when: CheckPhase::InFlight, stale_s: None, read: |inputs, battery| {
         let resistance = inputs.derived.resistance.get(usize::from(battery))?;
         of(inputs, battery, |_| resistance.rise_percent())
     }),
     row!("batt_fault" BATTERY, above(BatFaultWarn _ 0.0), role: Role::of(Group::FailsafeCause, 0),
-        unit: Unit::FLAG, of: InstanceKind::Battery, alarm_only: true,
+        unit: Unit::FLAG, alarm_only: true,
         read: |inputs, battery| of(inputs, battery, |battery| Some(battery.faults.count_ones() as f32))),
     row!("batt_temperature" BATTERY, above(BatTempWarn BatTempCrit 3.0), unit: Unit::of("degC"),
-        of: InstanceKind::Battery,
         read: |inputs, battery| of(inputs, battery, |battery| Some(battery.temperature?.0))),
     row!("batt_state" BATTERY, above(BatStateWarn BatStateCrit 0.0),
     role: Role::of(Group::BatteryState, Group::Battery.bit()), unit: Unit::FLAG, when: CheckPhase::Armed,
-    of: InstanceKind::Battery, read: |inputs, battery| {
+    read: |inputs, battery| {
         // `MAV_BATTERY_CHARGE_STATE`: ok, charging; low, unhealthy; critical, emergency, failed.
         of(inputs, battery, |battery| match battery.charge {
             1 | 7 => Some(0.0),

@@ -52,11 +52,11 @@ pub(super) const CHECKS: &[Check] = &[
     row!("motor_output" ESC, above(MotOutWarn MotOutCrit 5.0),
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::of("%"),
         debounce_ms: [500, 1_000], when: CheckPhase::InFlight, instances: JUDGED_MAX as u8,
-        of: InstanceKind::Output, read: |inputs, motor| verdict(inputs, motor, Verdict::excess_percent)),
+        read: |inputs, motor| verdict(inputs, motor, Verdict::excess_percent)),
     // A driven motor is not thereby good.
     row!("motor_off" ESC, above(AlertWarn AlertCrit 0.0),
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::FLAG, alarm_only: true,
-        debounce_ms: [500, 1_000], when: CheckPhase::InFlight, instances: JUDGED_MAX as u8, of: InstanceKind::Output,
+        debounce_ms: [500, 1_000], when: CheckPhase::InFlight, instances: JUDGED_MAX as u8,
         read: |inputs, motor| verdict(inputs, motor, |verdict| if verdict == Verdict::ShutOff { 2.0 } else { 0.0 })
             .filter(|_| inputs.derived.motors.outputs.judged(inputs.vehicle) != 4)),
     row!("thrust_lost" ESC, above(ThrustWarn _ 0.0),

@@ -7,7 +7,7 @@
 //!
 //! A mishap explains only an alarm that begins with it or after it: an earlier one may be its cause.
 
-use super::check::Check;
+use super::check::{Check, InstanceKind};
 use super::finding::{Level, Subsystem};
 use super::tables::{check_of, slot_of};
 use crate::time::{BootMs, Millis};
@@ -226,8 +226,8 @@ impl Alarm {
     }
 
     fn may_concern(&self, other: &Self) -> bool {
-        let thing = self.check.of.thing();
-        thing.is_none() || thing != other.check.of.thing() || self.instance == other.instance
+        let of = self.check.of;
+        of == InstanceKind::Vehicle || of != other.check.of || self.instance == other.instance
     }
 
     fn explains(&self, effect: &Self) -> bool {
