@@ -21,7 +21,7 @@ use crate::imu_gnss::ImuGnssResidual;
 use crate::latest::Reading;
 use crate::mag_heading_residual::{self, CompassUse};
 use crate::motion::{IDLE_THROTTLE, throttle};
-use crate::observation::{Air, Gnss, Imu, Observation, Vibration, VibrationScale};
+use crate::observation::{Air, AttitudeSetpoint, Gnss, Imu, Observation, Vibration, VibrationScale};
 use crate::pairs::{Kind, Pairs};
 use crate::rate_tracking::{self, FullThrust, RateSetpoint};
 use crate::residual::{Comparison, Residuals};
@@ -84,16 +84,12 @@ impl Crosschecks {
             Observation::Attitude(attitude) => {
                 rate_tracking::take_attitude(residuals, at, attitude, rate_setpoint);
             }
-            Observation::AttitudeSetpoint(wanted) => {
-                rate_tracking::take_setpoint(rate_setpoint, at, wanted.rates, vehicle);
+            Observation::AttitudeSetpoint(AttitudeSetpoint { rates: Some(rates), .. }) => {
+                rate_tracking::take_setpoint(rate_setpoint, at, *rates, vehicle);
             }
-            Observation::SecondEstimate(second) => {
-                ahrs2_residual::take(residuals, at, second, vehicle);
-            }
+            Observation::SecondEstimate(second) => ahrs2_residual::take(residuals, at, second, vehicle),
             Observation::Hud(hud) => self.thrust.take(at, hud, vehicle, residuals.gates.are(gates::SETTLED)),
-            Observation::Estimator(estimator) => {
-                self.compass_use.take(at, estimator, residuals);
-            }
+            Observation::Estimator(estimator) => self.compass_use.take(at, estimator, residuals),
             Observation::Vibration(_) => self.take_vibration(at, vehicle),
             _ => {}
         }

@@ -75,16 +75,8 @@ impl Quantity {
     }
 
     /// Its place in the record, which never changes.
-    pub const fn index(self) -> usize {
-        match self {
-            Self::Vibration => 0,
-            Self::HoverThrottle => 1,
-            Self::Resistance(battery) => 2 + battery as usize,
-            Self::MotorSpeed(motor) => 2 + BATTERIES_MAX + motor as usize,
-            Self::HoverPower => 2 + BATTERIES_MAX + MOTORS_MAX,
-            Self::MotorOutput(motor) => 3 + BATTERIES_MAX + MOTORS_MAX + motor as usize,
-            Self::Capacity(battery) => 3 + BATTERIES_MAX + MOTORS_MAX + OUTPUTS_MAX + battery as usize,
-        }
+    pub fn index(self) -> usize {
+        Self::all().take_while(|before| *before != self).count()
     }
 
     /// Figures that differ by less are equal, in the quantity's unit.

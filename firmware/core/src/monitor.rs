@@ -146,16 +146,8 @@ impl Monitor {
         let event = self.step_flight(now);
         self.derived.step(now, &self.vehicle, &self.flight, event, recorder);
         self.step_wear();
-        let inputs = Inputs {
-            now,
-            vehicle: &self.vehicle,
-            flight: &self.flight,
-            derived: &self.derived,
-            link,
-            recorder,
-            wear: &self.wear,
-            params: &self.params,
-        };
+        let Self { vehicle, flight, derived, wear, params, .. } = self;
+        let inputs = Inputs { now, vehicle, flight, derived, link, recorder, wear, params };
         self.figures.step(&inputs, event);
         self.usage.step(&inputs, event);
         let mut crossed = false;
@@ -166,7 +158,7 @@ impl Monitor {
         if crossed || self.exceedances.lasting() {
             self.saving.change(ItemKey::Exceedances);
         }
-        self.usage.expose(now, &self.vehicle);
+        self.usage.expose(now, inputs.vehicle);
         if let Some(step) = self.protect.step(&inputs, &self.health) {
             self.happenings.push(Happening::Protect(step));
         }
@@ -182,16 +174,8 @@ impl Monitor {
         link: &'a LinkReading,
         recorder: &'a RecorderStatus,
     ) -> Inputs<'a> {
-        Inputs {
-            now,
-            vehicle: &self.vehicle,
-            flight: &self.flight,
-            derived: &self.derived,
-            link,
-            recorder,
-            wear: &self.wear,
-            params: &self.params,
-        }
+        let Self { vehicle, flight, derived, wear, params, .. } = self;
+        Inputs { now, vehicle, flight, derived, link, recorder, wear, params }
     }
 
     fn step_flight(&mut self, now: BootMs) -> Option<FlightEvent> {

@@ -19,7 +19,7 @@
 
 use core::ops::Range;
 
-use crate::flight::Flight;
+use crate::health::Inputs;
 use crate::latest::Reading;
 use crate::observation::{EscGroup, MOTORS_MAX, VehicleKind};
 use crate::outputs::MotorOutputs;
@@ -261,13 +261,8 @@ impl Motors {
     ///
     /// A turn, a lean and a load on one side drive motors in twos, threes and fours: one sense of rotation, the front, the
     /// upper ones of coaxial pairs. So a motor is off if no other one is near it.
-    pub(crate) fn imbalance(
-        &self,
-        now: BootMs,
-        vehicle: &Vehicle,
-        flight: &Flight,
-        motor: u8,
-    ) -> Option<Reading> {
+    pub(crate) fn imbalance(&self, inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {
+        let Inputs { now, vehicle, flight, .. } = *inputs;
         let track = self.track(motor).filter(|track| track.is_fitted() && !self.outputs.is_off(motor))?;
         let middle = self.middle_speed()?;
         // If one is lost, the opposite one may stop too.
@@ -348,14 +343,9 @@ fn is_fresh(now: BootMs, motor: &Motor) -> bool {
 }
 
 /// The mean is of the other motors here, while the throttle asks for thrust in hover.
-fn current_part(
-    now: BootMs,
-    vehicle: &Vehicle,
-    motor: usize,
-    is_among: impl Fn(usize) -> bool,
-) -> Option<f32> {
+fn current_part(now: BootMs, vehicle: &Vehicle, motor: usize, among: impl Fn(usize) -> bool) -> Option<f32> {
     let throttle = vehicle.hud.within(now, PAUSE)?.throttle?.0;
-    let current = |motor| current_a(now, vehicle, motor).filter(|_| is_among(motor));
+    let current = |motor| current_a(now, vehicle, motor).filter(|_| among(motor));
     let (own_a, mean_a, others) = against_others(motor, current)?;
     // PX4's motor failure check: below this throttle no motor is asked for much.
     let asked = vehicle.hovers(now) == Some(true) && throttle > CARRIES;

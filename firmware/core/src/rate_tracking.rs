@@ -29,13 +29,8 @@ const IN_VAIN: Millis = Millis::from_secs(2);
 
 pub(crate) type RateSetpoint = Latest<[RadiansPerSecond; 2]>;
 
-pub(crate) fn take_setpoint(
-    setpoint: &mut RateSetpoint,
-    at: BootMs,
-    rates: Option<WantedRates>,
-    vehicle: &Vehicle,
-) {
-    let Some(WantedRates { about, of }) = rates else { return };
+pub(crate) fn take_setpoint(setpoint: &mut RateSetpoint, at: BootMs, rates: WantedRates, vehicle: &Vehicle) {
+    let WantedRates { about, of } = rates;
     let [roll, pitch, _] = match of.filter(|_| vehicle.is_ardupilot()) {
         Some(of) => {
             let Some(attitude) = vehicle.attitude.within(at, FRESH) else { return };

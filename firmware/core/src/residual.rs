@@ -38,12 +38,6 @@ pub(crate) const AT_ONCE: Millis = Millis::from_millis(300);
 pub(crate) const KNOWN_SAMPLES: u8 = 20;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    Above,
-    Either,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Learn {
     /// Zero, for good.
     Nothing,
@@ -62,7 +56,8 @@ pub(crate) struct Row {
     clamp: f32,
     /// Period of a circular residual; 0 for others.
     period: f32,
-    side: Side,
+    /// A residual on either side of its baseline counts, not only above it.
+    is_two_sided: bool,
     learn: Learn,
     /// Half of the check's default limit.
     pub(crate) hold: f32,
@@ -74,7 +69,7 @@ const ROW: Row = Row {
     step_max: PAUSE,
     clamp: f32::INFINITY,
     period: 0.0,
-    side: Side::Above,
+    is_two_sided: false,
     learn: Learn::Range,
     hold: f32::INFINITY,
 };
@@ -93,13 +88,13 @@ const RATE: Row = Row {
     gates: gates::SETTLED | gates::CONTROLLED,
     smoothing_s: 1.0,
     step_max: Millis::from_millis(500),
-    side: Side::Either,
+    is_two_sided: true,
     learn: Learn::Nothing,
     ..ROW
 };
 
 /// The height of two sources, with an offset that is learnt.
-const HEIGHT: Row = Row { side: Side::Either, learn: Learn::Level, hold: 4.0, ..AHRS2 };
+const HEIGHT: Row = Row { is_two_sided: true, learn: Learn::Level, hold: 4.0, ..AHRS2 };
 
 /// Each comparison with its row.
 macro_rules! comparisons {
@@ -118,7 +113,7 @@ comparisons! {
         step_max: Millis::from_millis(250),
         clamp: 30.0,
         period: 360.0,
-        side: Side::Either,
+        is_two_sided: true,
         hold: 6.0,
         ..ROW
     };
@@ -229,7 +224,7 @@ impl Residual {
     /// The residual beyond its baseline, 0 at least; `None` until that is known.
     pub(crate) fn excess(&self, row: &Row) -> Option<f32> {
         let off = self.figure.departed();
-        let off = if row.side == Side::Either { libm::fabsf(off) } else { off };
+        let off = if row.is_two_sided { libm::fabsf(off) } else { off };
         let range = if row.learn == Learn::Range { self.figure.range() } else { 0.0 };
         self.figure.is_known().then(|| (off - range - self.allowance).max(0.0))
     }
@@ -282,7 +277,7 @@ mod tests {
     use super::*;
 
     const ABOVE: Row = Row { hold: 1.0, ..ROW };
-    const EITHER: Row = Row { side: Side::Either, ..ABOVE };
+    const EITHER: Row = Row { is_two_sided: true, ..ABOVE };
 
     fn taken(row: &Row, figures: impl Iterator<Item = f32>) -> Residual {
         let mut residual = Residual::default();

@@ -95,10 +95,9 @@ impl Flight {
         }
         // A hover is slow and still too.
         let may_hover = (height == Flies || (word == Flies && are_away(heights))) && !self.is_supported(now);
-        let power = self.power(now, vehicle);
-        let speed = self.speed(now, vehicle, is_lost, power, may_hover);
-        votes.take(THRUST, self.thrust_vote(now, vehicle, power, speed));
-        votes.take(INERTIAL, self.inertial(now, vehicle, power, heights, may_hover));
+        let speed = self.speed(now, vehicle, is_lost, may_hover);
+        votes.take(THRUST, self.thrust_vote(now, vehicle, speed));
+        votes.take(INERTIAL, self.inertial(now, vehicle, heights[0], may_hover));
         votes.take(SPEED, speed);
         votes
     }
@@ -155,9 +154,9 @@ impl Flight {
         })
     }
 
-    fn thrust_vote(&self, now: BootMs, vehicle: &Vehicle, power: Option<Power>, speed: Vote) -> Vote {
+    fn thrust_vote(&self, now: BootMs, vehicle: &Vehicle, speed: Vote) -> Vote {
         let climbs = || climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps.abs() > STILL_MPS);
-        match power {
+        match self.power(now, vehicle) {
             _ if !self.arming.is_on => Stands,
             None => Unknown,
             Some(Power::Little) => Undecided,
@@ -170,14 +169,7 @@ impl Flight {
         }
     }
 
-    fn inertial(
-        &self,
-        now: BootMs,
-        vehicle: &Vehicle,
-        power: Option<Power>,
-        [by_pressure, _]: [Vote; 2],
-        may_hover: bool,
-    ) -> Vote {
+    fn inertial(&self, now: BootMs, vehicle: &Vehicle, by_pressure: Vote, may_hover: bool) -> Vote {
         if self.stage.has_hit() {
             return Stands;
         }
@@ -191,20 +183,15 @@ impl Flight {
         if is_on_wings(now, vehicle) {
             return Undecided;
         }
-        let rests = power == Some(Power::Idle) && vehicle.inertial.is_level(now) && !may_hover;
+        let rests =
+            self.power(now, vehicle) == Some(Power::Idle) && vehicle.inertial.is_level(now) && !may_hover;
         // Simulators have no vibration.
         let is_quiet = vehicle.inertial.is_calm(now) && by_pressure == Stands;
         if rests || is_quiet || self.is_supported(now) { Stands } else { Undecided }
     }
 
-    fn speed(
-        &self,
-        now: BootMs,
-        vehicle: &Vehicle,
-        is_lost: bool,
-        power: Option<Power>,
-        may_hover: bool,
-    ) -> Vote {
+    fn speed(&self, now: BootMs, vehicle: &Vehicle, is_lost: bool, may_hover: bool) -> Vote {
+        let power = self.power(now, vehicle);
         let climb_mps = climb_mps(now, vehicle);
         let ground_mps = ground_speed_mps(now, vehicle);
         let is_over =

@@ -67,10 +67,12 @@ impl Health {
         exceedances: &mut Exceedances,
         findings: &mut impl FnMut(&Finding),
     ) {
-        let now = Now::of(inputs);
+        let hows = hows(inputs);
         let mut first = 0;
         for (place, check) in (0..).zip(checks()) {
-            let how = now.how(check);
+            let how = hows[check.when as usize];
+            // A mishap's level falls even where levels are latched: it explains other alarms only while it goes on.
+            let how = CheckStep { latched: how.latched && check.subsystem != Subsystem::Mishap, ..how };
             for instance in 0..check.instances {
                 let slot = first + usize::from(instance);
                 let Some(state) = self.states.get_mut(slot) else { break };
@@ -245,37 +247,24 @@ impl Health {
     }
 }
 
-struct Now {
-    /// Steps of checks, by [`CheckPhase`] they apply.
-    hows: [CheckStep; CheckPhase::ALL.len()],
-}
-
-impl Now {
-    fn of(inputs: &Inputs<'_>) -> Self {
-        let Inputs { now, vehicle, flight, .. } = *inputs;
-        let armed = vehicle.armed();
-        let is_silent = || vehicle.heartbeat.within(now, SILENT).is_none();
-        // A vehicle that is down and disarmed, or silent, is not judged any further.
-        let over = flight.in_mishap() && ((flight.is_down() && !armed) || is_silent());
-        // A mishap goes on: all but those that always apply would only echo it.
-        let quiet = flight.in_mishap() && !over;
-        let latched = armed && inputs.params.get(Param::Latch) >= 0.5;
-        let hows = CheckPhase::ALL.map(|when| {
-            let applies = match when {
-                CheckPhase::Always => return CheckStep { applies: true, quiet: false, latched },
-                CheckPhase::Armed => armed,
-                CheckPhase::InFlight => inputs.flight.airborne(),
-            };
-            CheckStep { applies: quiet || (!over && applies), quiet, latched }
-        });
-        Self { hows }
-    }
-
-    /// A mishap's level falls even where levels are latched: it explains what others say only while it goes on.
-    const fn how(&self, check: &Check) -> CheckStep {
-        let how = self.hows[check.when as usize];
-        CheckStep { latched: how.latched && !matches!(check.subsystem, Subsystem::Mishap), ..how }
-    }
+/// How checks are stepped, by [`CheckPhase`].
+fn hows(inputs: &Inputs<'_>) -> [CheckStep; CheckPhase::ALL.len()] {
+    let Inputs { now, vehicle, flight, .. } = *inputs;
+    let armed = vehicle.armed();
+    let is_silent = || vehicle.heartbeat.within(now, SILENT).is_none();
+    // A vehicle that is down and disarmed, or silent, is not judged any further.
+    let over = flight.in_mishap() && ((flight.is_down() && !armed) || is_silent());
+    // A mishap goes on: all but those that always apply would only echo it.
+    let quiet = flight.in_mishap() && !over;
+    let latched = armed && inputs.params.get(Param::Latch) >= 0.5;
+    CheckPhase::ALL.map(|when| {
+        let applies = match when {
+            CheckPhase::Always => return CheckStep { applies: true, quiet: false, latched },
+            CheckPhase::Armed => armed,
+            CheckPhase::InFlight => flight.airborne(),
+        };
+        CheckStep { applies: quiet || (!over && applies), quiet, latched }
+    })
 }
 
 /// Critical before stale before warning: not knowing is worse than a known warning, and better than a known danger.

@@ -39,16 +39,13 @@ pub(super) const CHECKS: &[Check] = &[
         stale_s: STALE_SLOW,
         read: |inputs, motor| state(inputs, motor, |_| inputs.derived.motors.errors(motor))),
     row!("motor_loss" ESC, below(_ MotLossCrit 5.0), role: Role::of(Group::MotorLoss, 0), unit: Unit::of("%"),
-    debounce_ms: [0, 500], when: CheckPhase::InFlight, read: |Inputs { now, vehicle, derived, .. }, motor| {
-        derived.motors.share(*now, vehicle, motor)
-    }),
+    debounce_ms: [0, 500], when: CheckPhase::InFlight,
+        read: |inputs, motor| inputs.derived.motors.share(inputs.now, inputs.vehicle, motor)),
     // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
     row!("motor_imbalance" ESC, above(MotImbalWarn MotImbalCrit 2.0),
     role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::of("%"),
     debounce_ms: [3_000, 1_000], when: CheckPhase::InFlight,
-    read: |Inputs { now, vehicle, flight, derived, .. }, motor| {
-        derived.motors.imbalance(*now, vehicle, flight, motor)
-    }),
+    read: |inputs, motor| inputs.derived.motors.imbalance(inputs, motor)),
     row!("motor_output" ESC, above(MotOutWarn MotOutCrit 5.0),
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::of("%"),
         debounce_ms: [500, 1_000], when: CheckPhase::InFlight, instances: JUDGED_MAX as u8,

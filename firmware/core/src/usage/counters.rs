@@ -22,14 +22,6 @@ pub enum Form {
 }
 
 impl Form {
-    /// Bytes of the stored form.
-    pub const fn bytes(self) -> usize {
-        match self {
-            Self::Amount => 8,
-            _ => 4,
-        }
-    }
-
     /// The value of a counter that has counted nothing.
     pub const fn nothing(self) -> f64 {
         match self {
@@ -181,7 +173,7 @@ pub const fn exposure_number(quantity: ExposureQuantity, bin: usize) -> u8 {
 }
 
 /// The number of a flight's figure.
-pub const fn figure_number(quantity: Steady) -> u8 {
+pub fn figure_number(quantity: Steady) -> u8 {
     FIGURE_FIRST + quantity.index() as u8
 }
 
