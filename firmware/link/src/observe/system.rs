@@ -153,3 +153,19 @@ pub(super) fn command_ack(payload: &[u8]) -> CommandAck {
     let target = (system != 0).then_some(Source { system, component });
     CommandAck { command: fields.u16(0), result: fields.u8(2), target }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_unique_id_counts_where_the_short_one_is_zero() {
+        let mut payload = [0; 78];
+        payload[60..72].copy_from_slice(&[0x29, 0, 0x20, 0, 0x0d, 0x51, 0x33, 0x31, 0x30, 0x36, 0x34, 0x31]);
+        let uid = |payload: &[u8]| identity(payload).map(|identity| identity.uid);
+        assert_eq!(uid(&payload), Some(0x3133_510d_0020_0029 ^ 0x3134_3630));
+        assert_eq!(uid(&payload[..60]), Some(0));
+        payload[8] = 7;
+        assert_eq!(uid(&payload), Some(7));
+    }
+}
