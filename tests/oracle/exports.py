@@ -137,6 +137,8 @@ def ulog(path, lines):
         if data.name == "vehicle_attitude":
             norms = sum(data.data[f"q[{part}]"] ** 2 for part in range(4))
             check(all(abs(norm - 1) < 1e-5 for norm in norms), "vehicle_attitude: a quaternion is not of length 1")
+    said = [text.timestamp for text in log.logged_messages]
+    check(all(a <= b + 1_000_000 for a, b in zip(said, said[1:])), "the times of texts and findings fall")
     attitudes = sum(1 for line in lines if line.get("message") == "ATTITUDE" and line["component"] == 1)
     if attitudes:
         check(topics.get("vehicle_attitude") == attitudes, f"vehicle_attitude: {topics} of {attitudes}")
