@@ -132,7 +132,13 @@ def main():
     result = {"queries": [answer for answer, _, _ in asked], "spark": "not asked for"}
     if "--spark" in sys.argv:
         summary = [(answer["heading"], query, rows) for answer, query, rows in asked if "files" not in answer]
-        result["spark"] = spark(summary, one)
+        try:
+            result["spark"] = spark(summary, one)
+        except Exception as error:
+            # snappy-java takes its library for musl wherever musl is installed.
+            if "UnsatisfiedLinkError" not in str(error):
+                raise
+            result["spark"] = "its library for Snappy does not load; remove the packages musl and musl-tools"
     print(json.dumps(result))
 
 
