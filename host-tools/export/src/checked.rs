@@ -21,7 +21,7 @@ const NOBODY: &str = "nobody";
 pub struct Checked {
     by: &'static str,
     verdict: &'static str,
-    findings: Vec<Finding>,
+    pub(crate) findings: Vec<Finding>,
     count: u64,
     judged: u64,
     not_judged: u64,
@@ -51,7 +51,7 @@ impl Checked {
     }
 
     /// Its findings, each with its row.
-    pub fn findings(&self) -> impl Iterator<Item = (&Finding, Row)> {
+    pub fn rows(&self) -> impl Iterator<Item = (&Finding, Row)> {
         self.findings.iter().map(|finding| (finding, finding_row(finding, self.by)))
     }
 

@@ -88,7 +88,7 @@ impl<'a> Writers<'a> {
             return Ok(None);
         }
         let mut collected = CollectedGroup::new(context);
-        for (finding, row) in checked.iter().flat_map(|checked| checked.findings()) {
+        for (finding, row) in checked.iter().flat_map(|checked| checked.rows()) {
             if context.selection.has_time(finding.at, &context.epochs) {
                 collected.rows(finding.at, &[row]);
                 collected.finding(finding);

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Result;
 use hums_core::clock::Instant;
 
-use crate::checked::{Checked, finding_words};
+use crate::checked::finding_words;
 use crate::context::Context;
 use crate::format::{Files, Finished, FormatDetails, SingleFile, Totals, Writer};
 use crate::journey::{CollectedFindings, utc};
@@ -97,8 +97,7 @@ impl Writer for Srt {
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         // Those of this program are known before; those of a board come in order.
-        let findings = context.checked.iter().flat_map(Checked::findings);
-        let findings = findings.map(|(finding, _)| finding.clone()).collect();
+        let findings = context.checked.iter().flat_map(|checked| &checked.findings).cloned().collect();
         let file = SingleFile::open(context, path)?;
         Ok(Self { file, reference: Reference::default(), begin_us: None, next_us: 0, findings, cues: 0 })
     }

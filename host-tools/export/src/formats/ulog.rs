@@ -14,7 +14,7 @@ use hums_core::observation::{
 };
 use hums_core::vehicle::Vehicle;
 
-use crate::checked::{Checked, finding_words};
+use crate::checked::finding_words;
 use crate::context::Context;
 use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, SingleFile, Spool, Totals, Writer};
 use crate::made::OutputFile;
@@ -411,7 +411,7 @@ impl Writer for Ulog {
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         // Those of this program are known before; those of a board come in order.
-        let findings = context.checked.iter().flat_map(Checked::findings).map(|(finding, _)| finding);
+        let findings = context.checked.iter().flat_map(|checked| &checked.findings);
         let findings = findings.filter(|finding| context.selection.has_time(finding.at, &context.epochs));
         Ok(Self {
             findings: findings.cloned().collect(),
