@@ -26,7 +26,12 @@ fn main() -> Result<(), String> {
     copy("memory.x", &out.join("memory.x"));
     let name = env::var("HUMS_BOARD").unwrap_or_else(|_| hums_boards::DEFAULT.to_owned());
     let board = hums_boards::find(&name).map_err(|why| format!("HUMS_BOARD: {why}"))?;
-    fs::write(out.join("board.rs"), code(board)).expect("OUT_DIR can be written");
+    // Clippy checks the types of every board beside those of the image's.
+    let boards = hums_boards::all().iter().fold(code(board), |boards, other| {
+        let code = code(other);
+        format!("{boards}#[cfg(clippy)]\n#[allow(dead_code)]\nconst _: () = {{\n{code}}};\n")
+    });
+    fs::write(out.join("board.rs"), boards).expect("OUT_DIR can be written");
     println!("cargo::rustc-link-search={}", out.display());
     let logs = env::var_os("CARGO_FEATURE_LOG").is_some();
     for argument in ["--nmagic", "-Tlink.x"].into_iter().chain(logs.then_some("-Tdefmt.x")) {

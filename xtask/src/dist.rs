@@ -57,9 +57,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     ensure_tool("deny", &["--debug"])?;
     // `cargo xtask test` leaves out one board.
     budgets::check(&hums_boards::all().iter().collect::<Vec<_>>(), false)?;
-    for board in hums_boards::all() {
-        firmware::lint(board)?;
-    }
+    firmware::lint()?;
     without_std()?;
     dependencies()?;
     lint_for(WINDOWS_TARGET)?;
@@ -128,8 +126,9 @@ impl Release {
     fn make(&self) -> Result<Vec<File>> {
         let mut files = Vec::new();
         for board in hums_boards::all() {
-            let arguments = [&firmware::cargo_arguments()[..], &firmware::LAST.map(Into::into)].concat();
-            self.cargo("build", &firmware::resident_arguments(), &board.name)?;
+            let arguments = firmware::cargo_arguments(firmware::APPLICATION);
+            let arguments = [&arguments[..], &firmware::LAST.map(Into::into)].concat();
+            self.cargo("build", &firmware::cargo_arguments(firmware::RESIDENT), &board.name)?;
             self.cargo("rustc", &arguments, &board.name)?;
             let programs = firmware::Programs::read(&self.target())?;
             let commit = self.commit.get(..12).unwrap_or(&self.commit);

@@ -32,13 +32,8 @@ pub(crate) fn target() -> String {
     format!("--target={FIRMWARE_TARGET}")
 }
 
-pub(crate) fn cargo_arguments() -> [String; 3] {
-    [format!("--package={APPLICATION}"), "--profile=firmware".into(), target()]
-}
-
-/// Arguments of the build of the resident program, for `cargo build`.
-pub(crate) fn resident_arguments() -> [String; 3] {
-    [format!("--package={RESIDENT}"), "--profile=firmware".into(), target()]
+pub(crate) fn cargo_arguments(package: &str) -> [String; 3] {
+    [format!("--package={package}"), "--profile=firmware".into(), target()]
 }
 
 pub(crate) fn image_of(board: &Board) -> PathBuf {
@@ -74,8 +69,8 @@ pub(crate) fn cargo(board: &Board) -> Result<Shell> {
 
 /// Returns the compiler's ELF files.
 fn compile(board: &Board, further: &[&str]) -> Result<Programs> {
-    cargo(board)?.arg("build").args(resident_arguments()).run()?;
-    cargo(board)?.arg("rustc").args(cargo_arguments()).args(further).args(LAST).run()?;
+    cargo(board)?.arg("build").args(cargo_arguments(RESIDENT)).run()?;
+    cargo(board)?.arg("rustc").args(cargo_arguments(APPLICATION)).args(further).args(LAST).run()?;
     Programs::read(&repo::target())
 }
 
@@ -156,17 +151,10 @@ pub(crate) fn files(
     Ok(files)
 }
 
-/// Of the boards without an image in `cargo xtask test`.
-pub(crate) fn check_others() -> Result<()> {
-    hums_boards::all().iter().filter(|board| board.name != hums_boards::DEFAULT).try_for_each(|board| {
-        cargo(board)?.args(["check", "--quiet", "--package", RESIDENT]).args(cargo_arguments()).run()
-    })
-}
-
-/// A warning is an error.
-pub(crate) fn lint(board: &Board) -> Result<()> {
-    let others = ["clippy", "--package", RESIDENT, "--package", CHIP];
-    cargo(board)?.args(others).args(cargo_arguments()).args(["--", "-D", "warnings"]).run()
+/// And the types of every board. A warning is an error.
+pub(crate) fn lint() -> Result<()> {
+    let others = ["--package", RESIDENT, "--package", CHIP, "--", "-D", "warnings"];
+    cargo(default_board())?.arg("clippy").args(cargo_arguments(APPLICATION)).args(others).run()
 }
 
 /// An unchanged image keeps its time, and nothing is made anew.

@@ -27,7 +27,7 @@ pub(super) fn run() -> Result<()> {
     changed.sort_unstable();
     changed.dedup();
     if FIRMWARE.iter().any(|package| changed.contains(package)) {
-        firmware::lint(firmware::default_board())?;
+        firmware::lint()?;
     }
     let choice: Vec<String> = changed
         .iter()

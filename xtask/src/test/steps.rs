@@ -86,7 +86,7 @@ pub(super) const STEPS: [Step; 19] = [
         "clippy-firmware",
         "lints of the firmware, and the types of every board",
         &[Clippy, FirmwareTarget],
-        lint,
+        firmware::lint,
     ),
     Step::new(Lint, "clippy", "lints of what runs on this PC", &[Clippy], pc::lint),
     Step::new(Lint, "doc", "the documentation builds without a warning", &[], pc::document),
@@ -124,11 +124,6 @@ fn size() -> Result<()> {
     println!("NOT TESTED: images of the other boards (cargo xtask prove boards)");
     println!("NOT TESTED: licences and sources of the dependencies (cargo xtask dist)");
     budgets::check(&[firmware::default_board()], false)
-}
-
-fn lint() -> Result<()> {
-    firmware::lint(firmware::default_board())?;
-    firmware::check_others()
 }
 
 /// By `host-tools/report/src/page/biome.json`. To format: `target/venv/bin/biome format --write` there.

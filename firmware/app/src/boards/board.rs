@@ -24,18 +24,6 @@ pub(crate) use super::stm32f4::{
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
 static GS_RING: ConstStaticCell<[u8; GS_RING_BYTES]> = ConstStaticCell::new([0; GS_RING_BYTES]);
 
-pub(crate) struct Parts {
-    pub(crate) autopilot: (PortRx, PortTx),
-    pub(crate) gs: (PortRx, PortTx),
-    pub(crate) card: Card,
-    /// Two sectors.
-    pub(crate) store: StoreFlash,
-    pub(crate) usb: Usb,
-    pub(crate) led: Led,
-    pub(crate) button: bool,
-    pub(crate) boot: Boot,
-}
-
 /// Pins of the backup domain, which some boards select the card with, allow 2 MHz only (DS8626, table 7).
 const SELECT_SPEED: Speed = Speed::Low;
 
@@ -124,6 +112,18 @@ macro_rules! board {
         pub(crate) type Card = SpiCard<card!(type $($card)*)>;
 
         bind_interrupts!(struct Irqs { $($stream => dma::InterruptHandler<peripherals::$channel>;)* OTG_FS => usb::InterruptHandler<peripherals::USB_OTG_FS>; });
+
+        pub(crate) struct Parts {
+            pub(crate) autopilot: (PortRx, PortTx),
+            pub(crate) gs: (PortRx, PortTx),
+            pub(crate) card: Card,
+            /// Two sectors.
+            pub(crate) store: StoreFlash,
+            pub(crate) usb: Usb,
+            pub(crate) led: Led,
+            pub(crate) button: bool,
+            pub(crate) boot: Boot,
+        }
 
         pub(crate) fn take() -> Parts {
             let (cause, cause_register) = reset_cause();

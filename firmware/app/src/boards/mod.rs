@@ -18,5 +18,6 @@
 
 pub(crate) mod board;
 pub(crate) mod machine;
-#[expect(dead_code, unused_imports, reason = "a board uses one of the two kinds of card ports")]
+// A board uses one of the two kinds of card ports.
+#[cfg_attr(not(clippy), allow(dead_code, unused_imports))]
 mod stm32f4;
