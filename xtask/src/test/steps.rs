@@ -89,7 +89,7 @@ pub(super) const STEPS: [Step; 19] = [
         firmware::lint,
     ),
     Step::new(Lint, "clippy", "lints of what runs on this PC", &[Clippy], pc::lint),
-    Step::new(Lint, "doc", "the documentation builds without a warning", &[], pc::document),
+    Step::new(Lint, "doc", "the documentation builds without a warning", &[Clippy], pc::document),
     Step::new(Compute, "chip", "the image that is flashed, on the model of its chip", CHIP, chip),
     Step::new(Compute, "unit", "tests of each crate on this PC", &[], pc::unit_tests),
     Step::new(
