@@ -11,7 +11,7 @@ use hums_update::{header, map};
 use crate::dfu;
 use crate::image::{self, Piece};
 use crate::repo::{self, FIRMWARE_TARGET};
-use crate::shell::Shell;
+use crate::shell::{Shell, TAKEN};
 use crate::update::{self, SecretKey};
 
 /// Of `cargo rustc` for the last crate: inlines only functions below half of the compiler's limit. 4.7 KB of flash less, 0.2 %
@@ -119,9 +119,14 @@ pub(crate) fn build_beside(
     pc: impl FnOnce() -> Result<()>,
 ) -> Result<()> {
     std::thread::scope(|scope| {
-        let firmware = scope.spawn(|| boards.into_iter().try_for_each(|board| build(board).map(drop)));
+        let firmware = scope.spawn(|| {
+            let built = boards.into_iter().try_for_each(|board| build(board).map(drop));
+            (built, TAKEN.get())
+        });
         pc()?;
-        firmware.join().unwrap_or_else(|_| bail!("the build of the firmware panicked"))
+        let Ok((built, taken)) = firmware.join() else { bail!("the build of the firmware panicked") };
+        TAKEN.set(TAKEN.get() + taken);
+        built
     })
 }
 

@@ -18,34 +18,20 @@ use crate::shell::Shell;
 /// The campaigns' tools for cards.
 pub(crate) const NEEDS: &[Need] = &[Need::Dosfstools];
 
-const CHIP: &str = "chip";
-
-const BOARDS: &str = "boards";
-
-const FOREIGN: &str = "foreign";
-
-const BROWSER: &str = "browser";
-
-const DIAGNOSIS: &str = "diagnosis";
-
-const FLEET: &str = "fleet";
-
-const STORAGE: &str = "storage";
-
 /// Names, `--short`, `--seed N`, `--runs N`; `diagnosis`, `chip` and `foreign` have their own.
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
     match arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
-        Some((CHIP, rest)) => return chip(&[firmware::default_board()], rest),
-        Some((BOARDS, [])) => {
+        Some(("chip", rest)) => return chip(&[firmware::default_board()], rest),
+        Some(("boards", [])) => {
             return chip(&hums_boards::all().iter().collect::<Vec<_>>(), &["boards::".to_owned()]);
         }
-        Some((FOREIGN, rest)) => return foreign::run(rest),
-        Some((BROWSER, [])) => return in_browsers(),
-        Some((FLEET, _)) => return fleet(arguments),
-        Some((STORAGE, [])) => return storage(arguments),
+        Some(("foreign", rest)) => return foreign::run(rest),
+        Some(("browser", [])) => return in_browsers(),
+        Some(("fleet", _)) => return fleet(arguments),
+        Some(("storage", [])) => return storage(arguments),
         _ => {}
     }
-    let is_diagnosis = arguments.first().is_some_and(|first| first == DIAGNOSIS);
+    let is_diagnosis = arguments.first().is_some_and(|first| first == "diagnosis");
     let mut needs = if is_diagnosis { Vec::new() } else { NEEDS.to_vec() };
     needs.push(Need::Linker);
     setup::require(&needs)?;

@@ -1,11 +1,14 @@
 //! Programs: each command is shown, to be typed by hand.
 
+use std::cell::Cell;
 use std::ffi::OsStr;
+use std::io::Read as _;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 
 use anyhow::{Context as _, Result, bail};
+use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
 
 /// A command line with a readable form.
 pub(crate) struct Shell {
@@ -67,7 +70,7 @@ impl Shell {
     /// A non-zero exit is an error.
     pub(crate) fn run(mut self) -> Result<()> {
         eprintln!("$ {}", self.shown);
-        let status = self.command.status().with_context(|| format!("cannot run {}", self.shown))?;
+        let Output { status, .. } = self.wait()?;
         if !status.success() {
             bail!("`{}` ended with {status}", self.shown);
         }
@@ -77,13 +80,24 @@ impl Shell {
     /// Stdout, and the code: `hums decode`'s 3 is a result.
     pub(crate) fn output_and_code(mut self) -> Result<(String, i32)> {
         eprintln!("$ {}", self.shown);
-        let output = self
-            .command
-            .stderr(Stdio::inherit())
-            .output()
-            .with_context(|| format!("cannot run {}", self.shown))?;
+        self.command.stdout(Stdio::piped());
+        let output = self.wait()?;
         let code = output.status.code().with_context(|| format!("`{}` was ended by a signal", self.shown))?;
         Ok((String::from_utf8_lossy(&output.stdout).into_owned(), code))
+    }
+
+    /// Ends with the program, and adds to [`TAKEN`].
+    fn wait(&mut self) -> Result<Output> {
+        let mut child = self.command.spawn().with_context(|| format!("cannot run {}", self.shown))?;
+        let mut stdout = Vec::new();
+        if let Some(mut pipe) = child.stdout.take() {
+            pipe.read_to_end(&mut stdout).with_context(|| format!("cannot read from {}", self.shown))?;
+        }
+        // Until it is asked for its status, its times can be read.
+        waitid(WaitId::Pid(Pid::from_child(&child)), WaitIdOptions::EXITED | WaitIdOptions::NOWAIT)?;
+        let seconds = processor_seconds(&child.id().to_string()).unwrap_or_default();
+        TAKEN.set(TAKEN.get() + seconds);
+        Ok(Output { status: child.wait()?, stdout, stderr: Vec::new() })
     }
 
     /// A non-zero exit is an error.
@@ -101,6 +115,19 @@ impl Shell {
         let output = self.command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
     }
+}
+
+thread_local! {
+    /// Seconds of the processor that this thread's programs took.
+    pub(crate) static TAKEN: Cell<f64> = const { Cell::new(0.0) };
+}
+
+/// Of a process and its ended children (proc(5): fields 14 to 17, ticks of 10 ms).
+pub(crate) fn processor_seconds(process: &str) -> Option<f64> {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // The second field: a name in brackets.
+    let fields = stat.rsplit_once(')')?.1.split_whitespace().skip(11).take(4);
+    Some(fields.filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0)
 }
 
 pub(crate) fn is_root() -> bool {
@@ -138,5 +165,14 @@ mod tests {
     fn an_exit_code_is_a_result_where_asked_for() {
         let (text, code) = Shell::new("sh").args(["-c", "echo out; exit 3"]).output_and_code().unwrap();
         assert_eq!((text.as_str(), code), ("out\n", 3));
+    }
+
+    #[test]
+    fn the_processor_time_of_programs_that_ended_is_this_threads() {
+        let busy = || Shell::new("sh").args(["-c", "i=0; while [ $i -lt 300000 ]; do i=$((i+1)); done"]);
+        std::thread::spawn(move || busy().run().unwrap()).join().unwrap();
+        assert!(TAKEN.get() == 0.0);
+        busy().run().unwrap();
+        assert!(TAKEN.get() > 0.0 || !cfg!(target_os = "linux"));
     }
 }

@@ -1,7 +1,7 @@
 //! CI's checks as named steps.
 //!
-//! The build comes first; then lints, what computes and what waits run side by side. A table has each step's seconds. A step without
-//! its tool is left out, and the run fails at its end.
+//! The build comes first; then lints, what computes and what waits run side by side. A table has each step's seconds,
+//! and the processor's. A step without its tool is left out, and the run fails at its end.
 
 mod quick;
 mod steps;
@@ -12,6 +12,7 @@ use anyhow::{Context as _, Error, Result, bail};
 use clap::builder::PossibleValuesParser;
 
 use crate::setup::{self, Need, Outcome};
+use crate::shell;
 use steps::{STEPS, Stage, Step};
 
 /// Arguments of `test`.
@@ -75,13 +76,14 @@ pub(crate) fn run(options: &Options) -> Result<()> {
                 rows.extend(others);
             }
         }
-        println!("\n{:<16} {:>8}", "step", "seconds");
+        println!("\n{:<16} {:>8} {:>10}", "step", "seconds", "processor");
         for row in &rows {
             let word = if row.failed.is_some() { "  FAILED" } else { "" };
-            match row.seconds {
-                Some(seconds) => println!("{:<16} {seconds:>8.1}{word}", row.step),
-                None => println!("{:<16} {:>8}  a tool is missing", row.step, "-"),
-            }
+            let seconds = row.seconds.map_or_else(
+                || format!("{:>8} {:>10}  a tool is missing", "-", "-"),
+                |[seconds, processor]| format!("{seconds:>8.1} {processor:>10.1}"),
+            );
+            println!("{:<16} {seconds}{word}", row.step);
         }
         rows.into_iter().find_map(|row| row.failed).map_or_else(|| there.require_all(), Err)
     })
@@ -89,17 +91,15 @@ pub(crate) fn run(options: &Options) -> Result<()> {
 
 fn timed(run: impl FnOnce() -> Result<()>) -> Result<()> {
     let (start, done) = (Instant::now(), run());
-    println!("{:<16} {:>8.1}", "in all", start.elapsed().as_secs_f64());
-    if let Some(seconds) = processor_seconds() {
-        println!("{:<16} {seconds:>8.1}", "processor");
-    }
+    let processor = shell::processor_seconds("self").unwrap_or_default();
+    println!("{:<16} {:>8.1} {processor:>10.1} of the processor", "in all", start.elapsed().as_secs_f64());
     done
 }
 
 struct Row {
     step: &'static str,
-    /// None: a tool is missing.
-    seconds: Option<f64>,
+    /// And the processor's, of its programs. None: a tool is missing.
+    seconds: Option<[f64; 2]>,
     failed: Option<Error>,
 }
 
@@ -111,24 +111,16 @@ fn one_after_the_other(steps: impl Iterator<Item = &'static Step>, there: &Outco
             continue;
         }
         println!("\n=== {}: {}", step.name, step.about);
-        let begun = Instant::now();
+        let (begun, taken) = (Instant::now(), shell::TAKEN.get());
         let alone = || format!("step {0}; alone: cargo xtask test --only {0}", step.name);
         let failed = (step.run)().with_context(alone).err();
-        rows.push(Row { step: step.name, seconds: Some(begun.elapsed().as_secs_f64()), failed });
+        let seconds = [begun.elapsed().as_secs_f64(), shell::TAKEN.get() - taken];
+        rows.push(Row { step: step.name, seconds: Some(seconds), failed });
         if rows.iter().any(|row| row.failed.is_some()) {
             break;
         }
     }
     rows
-}
-
-/// Time of ended children and theirs (proc(5): fields 16 and 17, ticks of 10 ms).
-fn processor_seconds() -> Option<f64> {
-    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The second field: a name in brackets.
-    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    let ticks = |field: usize| fields.get(field)?.parse::<f64>().ok();
-    Some((ticks(13)? + ticks(14)?) / 100.0)
 }
 
 #[cfg(test)]
@@ -157,15 +149,5 @@ mod tests {
             assert_eq!(names, expected);
         }
         assert_eq!(chosen(&[]).len(), STEPS.len());
-    }
-
-    #[test]
-    fn the_processor_time_of_children_that_ended_counts() {
-        let before = processor_seconds();
-        std::process::Command::new("sh")
-            .args(["-c", "i=0; while [ $i -lt 300000 ]; do i=$((i+1)); done"])
-            .status()
-            .unwrap();
-        assert!(processor_seconds() > before || !cfg!(target_os = "linux"));
     }
 }
