@@ -28,4 +28,3 @@ pub use framer::{Framer, FramerCounts};
 pub use hums_dialect::ids;
 pub use long_text::LongTexts;
 pub use observe::observe;
-pub use telling::hold;

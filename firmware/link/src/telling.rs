@@ -227,7 +227,7 @@ const fn mild(mut alarm: Alarm) -> Alarm {
 }
 
 /// How long a check's warning waits before it is sent.
-pub fn hold(check: &str) -> Span {
+fn hold(check: &str) -> Span {
     let is_derived = health::check_named(check).is_some_and(|check| check.role.is_derived());
     if is_derived { DERIVED_HOLD } else { HOLD }
 }

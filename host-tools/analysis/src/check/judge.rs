@@ -30,6 +30,7 @@ use super::flights::{Flight, Flights, begin_in_air, is_in_air};
 use super::judged::{BoxAir, Holes, JudgedBy, Judgement};
 use super::link_loss::{LinkLoss, Verdict};
 use super::problem::{IMPACT, LISTED_MAX, Problems};
+use super::radio::Radio;
 use super::trends::{self, Episode, FlightFigures};
 use crate::names::vocabulary;
 pub use crate::params::Limits;
@@ -118,6 +119,7 @@ pub struct Judge {
     no_times: Option<Instant>,
     /// See [`Judgement::box_air`].
     box_air: Option<BoxAir>,
+    radio: Option<Box<Radio>>,
 }
 
 impl Judge {
@@ -156,7 +158,15 @@ impl Judge {
             joints: Vec::new(),
             no_times: None,
             box_air: None,
+            radio: None,
         }
+    }
+
+    /// Also selects the texts to the pilot: [`Judgement::told`].
+    #[must_use]
+    pub fn telling(self) -> Self {
+        let radio = Some(Box::new(Radio::new(self.limits.params())));
+        Self { radio, ..self }
     }
 
     /// Received at this place.
@@ -516,16 +526,24 @@ impl Judge {
         let of = |at| Instant::of(at, steps);
         let (link, recorder) = (self.link(steps), RecorderStatus::default());
         let mut found = Vec::new();
-        self.monitor
-            .tick(steps.into(), &link, &recorder, &mut |finding| found.push(Finding::new(steps, finding)));
-        for finding in found {
-            if is_of(&finding.check, self.format, self.wire.is_some()) {
-                // Seen seconds after an impact.
-                let hit_at = if is_hit(&finding) { of(self.monitor.flight().hit_at()) } else { finding.at };
-                let at = Clock::recording(now, steps, hit_at.min(finding.at));
-                self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
-                self.details.tell(&finding.check, &mut self.here);
+        let (format, on_the_wire) = (self.format, self.wire.is_some());
+        self.monitor.tick(steps.into(), &link, &recorder, &mut |finding| {
+            if is_of(finding.check, format, on_the_wire) {
+                if let Some(radio) = &mut self.radio {
+                    radio.finding(steps, Clock::recording(now, steps, of(finding.at)), finding);
+                }
+                found.push(Finding::new(steps, finding));
             }
+        });
+        if let Some(radio) = &mut self.radio {
+            radio.tick(steps, now, &self.monitor);
+        }
+        for finding in found {
+            // Seen seconds after an impact.
+            let hit_at = if is_hit(&finding) { of(self.monitor.flight().hit_at()) } else { finding.at };
+            let at = Clock::recording(now, steps, hit_at.min(finding.at));
+            self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
+            self.details.tell(&finding.check, &mut self.here);
         }
         while let Some(happening) = self.monitor.take_happening() {
             match happening {
@@ -698,6 +716,7 @@ impl Judge {
             armed,
             flights,
             box_air: self.box_air,
+            told: self.radio.map_or_else(Vec::new, |radio| radio.end()),
             ends_in_air,
             findings_count,
             findings,

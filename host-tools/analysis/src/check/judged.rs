@@ -10,6 +10,7 @@ use hums_core::vehicle::Vehicle;
 use super::coverage::OFF;
 use super::flights::{Flight, begin_in_air};
 use super::problem::{LISTED_MAX, Problem, Problems, rank, worst_first};
+use super::radio::Told;
 use super::trends::{Baselines, Episode, because};
 use crate::names::vocabulary;
 use crate::source::epochs::Epochs;
@@ -97,6 +98,8 @@ pub struct Judgement {
     pub ends_in_air: Option<EndsInAir>,
     /// Changes of level in order, up to [`super::problem::LISTED_MAX`].
     pub findings: Vec<Finding>,
+    /// Texts to the pilot, in order; none without [`super::judge::Judge::telling`].
+    pub told: Vec<Told>,
     /// Number of findings.
     pub findings_count: u64,
     /// Worst first.

@@ -21,6 +21,7 @@ pub mod past;
 #[cfg(test)]
 mod pauses;
 pub mod problem;
+pub mod radio;
 pub mod text;
 pub mod trends;
 
@@ -197,9 +198,9 @@ impl HasEnding for Told {
     }
 }
 
-/// Judges one recording, as `hums check` does.
+/// Judges one recording, as `hums check` does, and with the texts to the pilot: [`Judgement::told`].
 pub fn recording(place: &LogPlace, limits: &Limits, heard: HeardAt) -> Result<Checked> {
-    overview::judge(place, limits, heard, false).map(|read| checked(place, read))
+    overview::judge_texts(place, limits, heard).map(|read| checked(place, read))
 }
 
 fn checked(place: &LogPlace, read: Read) -> Checked {

@@ -44,12 +44,18 @@ pub(super) struct Read {
 
 /// `shows`: progress.
 pub(super) fn judge(place: &LogPlace, limits: &Limits, heard: HeardAt, shows: bool) -> Result<Read> {
-    judge_telling(place, limits, heard, shows, &mut |_, _| Ok(()))
+    judge_telling(place, &|format| Judge::new(limits, format).heard(heard), heard, shows, &mut |_, _| Ok(()))
+}
+
+/// With the texts to the pilot.
+pub(super) fn judge_texts(place: &LogPlace, limits: &Limits, heard: HeardAt) -> Result<Read> {
+    let judge = |format| Judge::new(limits, format).heard(heard).telling();
+    judge_telling(place, &judge, heard, false, &mut |_, _| Ok(()))
 }
 
 fn judge_telling(
     place: &LogPlace,
-    limits: &Limits,
+    judge: &dyn Fn(Format) -> Judge,
     heard: HeardAt,
     shows: bool,
     take: &mut ItemSink<'_>,
@@ -57,7 +63,7 @@ fn judge_telling(
     let recording = place.open()?;
     let (format, progress) = (recording.format, recording.progress.clone());
     let bar = progress::bytes(progress.total().filter(|_| shows), &place.title);
-    let (mut judge, mut items) = (Judge::new(limits, format).heard(heard), 0_u32);
+    let (mut judge, mut items) = (judge(format), 0_u32);
     let want = Needs { observations: true, frames: heard == HeardAt::OnTheWire, ..Needs::default() };
     let summary = recording.read(want, &mut |at, item| {
         judge.item(at, item);
@@ -143,7 +149,7 @@ fn read_other(place: &LogPlace, take: Option<&mut ItemSink<'_>>) -> Result<(Over
     let mut nothing = |_, _: Item<'_>| Ok(());
     let take = take.unwrap_or(&mut nothing);
     let Read { format, judged, summary, taken } =
-        judge_telling(place, &limits, HeardAt::Somewhere, true, take)?;
+        judge_telling(place, &|format| Judge::new(&limits, format), HeardAt::Somewhere, true, take)?;
     is_heard(place, judged.vehicle().source.is_some())?;
     let mut contents = Contents {
         messages: summary.messages,

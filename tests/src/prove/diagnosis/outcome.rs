@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use hums::check::causes::causes as causes_of;
 use hums::check::flights::Flight;
 use hums::check::judge::{HeardAt, Limits};
 use hums::check::judged::Judgement;
@@ -12,7 +11,6 @@ use hums::names::{autopilot_name, counter_name, type_name};
 use hums::source::recording::LogPlace;
 use hums::source::told::Finding;
 use hums_core::health::Level;
-use hums_link::hold;
 
 use super::causes;
 use super::labels::Label;
@@ -92,7 +90,9 @@ fn learn(past: &[PathBuf]) -> Result<Baselines> {
 fn of(judged: &Judgement, name: &str, label: Option<&Label>) -> Outcome {
     let recorded_s = judged.span.map_or(0.0, |(_, last)| last.as_secs_f64());
     let alarms = alarms(judged);
-    let heard = heard(&judged.findings);
+    let heard = judged.told.iter();
+    let heard = heard.map(|of| Alarm { check: of.check.clone(), level: of.level, at_s: of.at.as_secs_f64() });
+    let heard: Vec<Alarm> = heard.collect();
     let quiet_s = label.and_then(|label| label.fault_s).unwrap_or(recorded_s);
     let air = match label.and_then(|label| label.flights.clone()) {
         Some(flights) => flights,
@@ -136,36 +136,13 @@ const fn rank(level: Level) -> u8 {
     }
 }
 
-pub(super) fn rises(judged: &Judgement) -> impl Iterator<Item = &Finding> {
+fn rises(judged: &Judgement) -> impl Iterator<Item = &Finding> {
     judged.findings.iter().filter(|finding| rank(finding.level) > rank(finding.previous))
 }
 
 fn alarms(judged: &Judgement) -> Vec<Alarm> {
     let alarm = |of: &Finding| Alarm { check: of.check.clone(), level: of.level, at_s: of.at.as_secs_f64() };
     rises(judged).map(alarm).collect()
-}
-
-/// What a pilot hears, in order: a critical finding at once, a warning after its [`hold`] if it still stands. Not what another one explains by
-/// then. A critical finding that a milder one explains is told in that one's words.
-pub(super) fn heard(findings: &[Finding]) -> Vec<Alarm> {
-    let mut heard = Vec::new();
-    let risen = |(_, one): &(usize, &Finding)| rank(one.level) > rank(one.previous);
-    for (place, finding) in findings.iter().enumerate().filter(risen) {
-        let is_critical = finding.level == Level::Critical;
-        let at = if is_critical { finding.at } else { finding.at + hold(&finding.check) };
-        let by_then = &findings[..findings.partition_point(|other| other.at <= at)];
-        let is_same = |other: &&Finding| (&other.check, other.instance) == (&finding.check, finding.instance);
-        let is_so = by_then.iter().rfind(is_same).is_some_and(|last| last.level == finding.level);
-        if is_so && causes_of(by_then)[place].is_none() {
-            let as_warning = |one: &Finding| if rank(one.level) > 0 { Level::Warning } else { one.level };
-            let milder = by_then.iter().map(|one| Finding { level: as_warning(one), ..one.clone() });
-            let cause = causes_of(&milder.collect::<Vec<_>>()).swap_remove(place).filter(|_| is_critical);
-            let (check, level) = (cause.unwrap_or_else(|| finding.check.clone()), finding.level);
-            heard.push(Alarm { check, level, at_s: at.as_secs_f64() });
-        }
-    }
-    heard.sort_by(|one, other| one.at_s.total_cmp(&other.at_s));
-    heard
 }
 
 fn fault(alarms: &[Alarm], heard: &[Alarm], label: &Label) -> Option<Fault> {
@@ -205,9 +182,6 @@ fn counted(judged: &Judgement) -> Counts {
 
 #[cfg(test)]
 mod tests {
-    use hums_core::clock::Instant;
-    use hums_core::health::Subsystem;
-
     use super::*;
 
     fn alarm(check: &str, level: Level, at_s: f64) -> Alarm {
@@ -241,42 +215,6 @@ mod tests {
         assert!(!gnss.right_first && fault(&alarms, &alarms[2..], &label("gnss")).unwrap().right_first);
         let missed = fault(&alarms[..1], &[], &label("gnss")).unwrap();
         assert_eq!((missed.told, missed.named), (None, None), "what was there before is no news");
-    }
-
-    fn finding(at_ms: u64, check: &str, level: Level) -> Finding {
-        Finding {
-            at: Instant::from_millis(at_ms),
-            subsystem: Subsystem::Navigation,
-            check: check.to_owned(),
-            instance: 0,
-            level,
-            previous: Level::Ok,
-            value: 1.0,
-            worst: None,
-            limit: 1.0,
-            unit: String::new(),
-        }
-    }
-
-    #[test]
-    fn a_pilot_hears_a_warning_after_its_hold_if_nothing_explains_it_and_a_critical_finding_at_once() {
-        let (warning, critical) = (Level::Warning, Level::Critical);
-        let doubts = (0, "ekf_variance", warning);
-        for (findings, expected) in [
-            (&[doubts, (2_000, "gps_stuck", warning)][..], "3.0 gps_stuck"),
-            (&[doubts, (3_500, "gps_stuck", warning)], "3.0 ekf_variance, 4.5 gps_stuck"),
-            (
-                &[doubts, (500, "gps_stuck", warning), (700, "ekf_failsafe", critical)],
-                "0.7 gps_stuck, 1.5 gps_stuck",
-            ),
-            (&[doubts, (900, "ekf_variance", Level::Ok)], ""),
-            (&[(0, "gps_fix", critical), doubts], "0.0 gps_fix"),
-        ] {
-            let findings = findings.iter().map(|(at, check, level)| finding(*at, check, *level));
-            let heard = heard(&findings.collect::<Vec<_>>());
-            let heard: Vec<_> = heard.iter().map(|one| format!("{:.1} {}", one.at_s, one.check)).collect();
-            assert_eq!(heard.join(", "), expected);
-        }
     }
 
     #[test]

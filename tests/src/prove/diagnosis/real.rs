@@ -1,6 +1,7 @@
 //! Real flights: recordings of vehicles, with labels by people who read the data.
 //!
-//! A folder of real flights has tables `labels*.csv` with a header. Other columns than these are ignored:
+//! A folder of real flights has tables `labels*.csv` with a header, or none, and the name of a folder in `tests/real-flights` that has.
+//! Other columns than these are ignored:
 //!
 //! | column | in the row of a flight | in the row of a finding |
 //! |---|---|---|
@@ -29,20 +30,24 @@ use rayon::prelude::*;
 use super::causes::{self, Class};
 use super::judged::{Judged, with_label};
 use super::options::Known;
-use super::outcome::{count, heard, rises};
+use super::outcome::count;
 use super::rates::{an_hour, hours, share};
 use super::table::{Form, records};
+use crate::flights::root;
 
 /// Tolerance of a finding before its label, in seconds: a check may have become faster.
 const EARLIER_S: f64 = 10.0;
 
 const TABLE: (&str, &str) = ("labels", ".csv");
 
+/// Tables of public recordings, by the name of the folder that has these.
+const LABELS: &str = "tests/real-flights";
+
 const COLUMNS: [&str; 6] = ["file", "check", "instance", "onset", "label", "cause"];
 
 pub(super) const RATES: Form = Form {
     title: "Real flights",
-    about: "Findings that the pilot receives: rises of a level without a cause among the other findings. Rates are per armed hour, \
+    about: "Texts to the pilot, as a box in the vehicle had selected and sent them, in the words of the cause if that was known. Rates are per armed hour, \
             without unlabelled findings. A needless finding is true, but no pilot, mechanic or owner would act on it. Fault first: of so many known \
             faults the first text to the pilot was of the failed part. Hours of simulators are in the air without a fault; each alarm in them is false.",
     columns: &[
@@ -161,9 +166,25 @@ pub(super) struct Results {
 }
 
 pub(super) fn find(folder: &Path, known: Known) -> Result<Option<Set>> {
-    let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+    let name = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let name = name.file_name().map_or_else(|| "given".into(), |name| name.to_string_lossy().into_owned());
+    let ours = root().join(LABELS).join(&name);
+    let tables = match tables(folder)? {
+        none if none.is_empty() && ours.is_dir() => tables(&ours)?,
+        own => own,
+    };
+    let mut flights = BTreeMap::new();
+    for table in &tables {
+        let text = fs::read_to_string(table).with_context(|| table.display().to_string())?;
+        read(folder, &text, &mut flights).with_context(|| table.display().to_string())?;
+    }
+    let set = Set { name, known, flights: flights.into_values().collect() };
+    Ok(Some(set).filter(|_| !tables.is_empty()))
+}
+
+fn tables(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut tables = Vec::new();
-    for entry in entries {
+    for entry in fs::read_dir(folder).with_context(|| folder.display().to_string())? {
         let entry = entry.with_context(|| folder.display().to_string())?;
         let name = entry.file_name().to_string_lossy().into_owned();
         if name.starts_with(TABLE.0) && name.ends_with(TABLE.1) {
@@ -171,15 +192,7 @@ pub(super) fn find(folder: &Path, known: Known) -> Result<Option<Set>> {
         }
     }
     tables.sort();
-    let mut flights = BTreeMap::new();
-    for table in &tables {
-        let text = fs::read_to_string(table).with_context(|| table.display().to_string())?;
-        read(folder, &text, &mut flights).with_context(|| table.display().to_string())?;
-    }
-    let name = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-    let name = name.file_name().map_or_else(|| "given".into(), |name| name.to_string_lossy().into_owned());
-    let set = Set { name, known, flights: flights.into_values().collect() };
-    Ok(Some(set).filter(|_| !tables.is_empty()))
+    Ok(tables)
 }
 
 fn read(folder: &Path, text: &str, flights: &mut BTreeMap<String, Flight>) -> Result<()> {
@@ -234,22 +247,17 @@ pub(super) fn judge(set: &Set) -> Result<Results> {
 }
 
 fn of(flight: &Flight, judged: &Judgement) -> Outcome {
-    let is_explained = |check: &str, instance: u8| {
-        let mut problems = judged.problems.iter();
-        problems.any(|one| one.check == check && one.instance == instance && one.because.is_some())
-    };
     let mut labels: BTreeMap<_, _> =
         flight.labels.iter().map(|(of, labels)| (of, labels.as_slice())).collect();
-    let told = rises(judged).filter(|finding| !is_explained(&finding.check, finding.instance));
-    let told = told.map(|finding| {
-        let at_s = finding.at.as_secs_f64();
-        let labels = labels.get_mut(&(finding.check.clone(), finding.instance));
-        let label = labels.and_then(|labels| take(labels, at_s));
+    let told = judged.told.iter().map(|told| {
+        let since_s = told.since.as_secs_f64();
+        let labels = labels.get_mut(&(told.check.clone(), told.instance));
+        let label = labels.and_then(|labels| take(labels, since_s));
         Told {
-            check: finding.check.clone(),
-            instance: finding.instance,
-            level: finding.level,
-            at_s,
+            check: told.check.clone(),
+            instance: told.instance,
+            level: told.level,
+            at_s: since_s,
             verdict: label.map_or(Verdict::Unlabelled, |label| label.verdict),
             evidence: label.map_or_else(String::new, |label| label.evidence.clone()),
         }
@@ -258,7 +266,7 @@ fn of(flight: &Flight, judged: &Judgement) -> Outcome {
         name: flight.name.clone(),
         armed_s: judged.armed.as_millis() as f64 / 1e3,
         right_first: flight.fault.map(|Fault { class, onset_s }| {
-            let first = heard(&judged.findings).into_iter().find(|one| onset_s - EARLIER_S <= one.at_s);
+            let first = judged.told.iter().find(|told| onset_s - EARLIER_S <= told.at.as_secs_f64());
             first.is_some_and(|first| class.checks.contains(&first.check.as_str()))
         }),
         told: told.collect(),
@@ -346,7 +354,6 @@ mod tests {
     use tempfile::TempDir;
 
     use super::*;
-    use crate::flights::root;
 
     const HEAD: &str = "file,check,instance,onset,label,cause\n";
 
