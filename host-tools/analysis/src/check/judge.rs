@@ -414,8 +414,8 @@ impl Judge {
         if is_its { Clock::recording(finding.at, steps, hit_at).min(finding.at) } else { finding.at }
     }
 
-    /// Another power-on in an autopilot's log or raw frames. No clock measures the time between: the flight is over. A box's
-    /// restart, or a set clock, ends no flight.
+    /// Another power-on in an autopilot's log or raw frames. No clock measures the time between: the flight is over. An autopilot that restarts
+    /// in flight begins another log, so the same log has been joined. A box's restart, or a set clock, ends no flight.
     fn restart(&mut self, at: Instant) {
         self.restarts += 1;
         if self.restarted.len() < LISTED_MAX {
@@ -423,7 +423,11 @@ impl Judge {
         }
         if matches!(self.format, Format::DataFlash | Format::Ulog | Format::Raw) {
             self.leave_off(at);
-            self.monitor.begin_anew();
+            if self.format == Format::Raw {
+                self.monitor.begin_anew();
+            } else {
+                self.monitor.begin_another_recording();
+            }
         }
     }
 

@@ -295,9 +295,15 @@ fn arming_that_is_guessed_from_the_throttle_is_no_disarming_in_the_air() {
 }
 
 #[test]
-fn a_second_power_on_in_one_recording_is_a_restart_only_where_the_vehicle_was_armed_before() {
-    for armed in [false, true] {
-        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+fn a_second_power_on_in_raw_frames_is_a_restart_only_where_the_vehicle_was_armed_before_and_a_log_is_joined()
+{
+    for (format, armed, restarts) in [
+        (Format::Raw, false, false),
+        (Format::Raw, true, true),
+        (Format::DataFlash, true, false),
+        (Format::Ulog, true, false),
+    ] {
+        let mut judge = Judge::new(&Limits::default(), format);
         let boot = |judge: &mut Judge, at_ms: u64, boot_ms: u32, armed: bool| {
             let at = Instant::from_millis(at_ms);
             judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(armed)));
@@ -313,7 +319,7 @@ fn a_second_power_on_in_one_recording_is_a_restart_only_where_the_vehicle_was_ar
         }
         let judged = judge.end();
         let told = judged.problems.iter().any(|problem| problem.check == "autopilot_reboot");
-        assert_eq!(told, armed, "{:?}", judged.problems);
+        assert_eq!(told, restarts, "{format:?}: {:?}", judged.problems);
     }
 }
 
