@@ -358,6 +358,7 @@ impl Flight {
         let is_slow = speed_mps < STILL_MPS
             || (!self.arming.is_on && on_rotors(now, vehicle))
             || self.lies_on_its_back(vehicle)
+            || self.was_thrown_down(now, vehicle)
             || (was_hit && self.felt.rate_radps < STILL_RADPS / 3.0);
         // Under a parachute it is carried, and goes down.
         let descends = self.pressure.steady_for(now).is_some_and(|span| span < RISES);

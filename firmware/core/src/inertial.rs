@@ -190,6 +190,12 @@ impl Inertial {
         self.is_fresh(now) && self.level_since.age(now).is_some_and(|age| age >= span)
     }
 
+    /// Whether it rests more than 30 degrees from upright by its weight: rotors pull along their axis.
+    pub(crate) fn lies_askew(&self, now: BootMs) -> bool {
+        let rests = self.is_fresh(now) && self.rests_since.age(now).is_some_and(|age| age >= LIES);
+        rests && self.level_since.age(now).is_none()
+    }
+
     /// The estimator's attitude.
     pub(crate) fn take_attitude(&mut self, at: BootMs, attitude: &Attitude) {
         let tilt = attitude.lean_rad();

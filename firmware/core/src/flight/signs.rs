@@ -392,7 +392,8 @@ impl Flight {
         let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
         let has_hit = (shock.stopped && hard && !lands)
             || (shock.dropped && shock.load_g > LEGS_G)
-            || (on_rotors(now, vehicle) && self.lies(now, vehicle));
+            || (on_rotors(now, vehicle) && self.lies(now, vehicle))
+            || self.was_thrown_down(now, vehicle);
         self.shock = Some(Shock { has_hit, ..shock });
         let rests =
             self.is_still(now) && self.still_since.age(now).is_some_and(|age| age <= now.since(shock.at));
@@ -402,6 +403,12 @@ impl Flight {
             self.see(now, MishapKind::Impact, shock.load_g, params);
             self.shock = None;
         }
+    }
+
+    /// Whether it rests after a shock as nobody lands.
+    pub(super) fn was_thrown_down(&self, now: BootMs, vehicle: &Vehicle) -> bool {
+        let is_hard = self.shock.is_some_and(|shock| shock.load_g > LEGS_G);
+        is_hard && on_rotors(now, vehicle) && vehicle.inertial.lies_askew(now)
     }
 
     /// Whether a still vehicle cannot hang in the air: it is off, landed by its own report, on its side, without

@@ -13,6 +13,8 @@ use crate::units::Radians;
 /// 25 degrees: an attitude follows the wanted one within this, but for moments that are shorter than the debounce. The thrust loss
 /// and crash checks of `ArduCopter` take 30 degrees.
 const FOLLOWS_RAD: f32 = 0.436;
+/// 100 degrees: beyond them it is overturned, which is a mishap.
+const OVERTURNED_RAD: f32 = 1.745;
 
 const ROLL: Check = Check {
     name: "roll",
@@ -47,6 +49,7 @@ fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) ->
             || told.map_or_else(|| is_banked_by_hand(vehicle), |told| apart(is, told) < FOLLOWS_RAD);
         // No angle is too much on wings or in transition, and none counts that the sensors contradict.
         let judged = vehicle.hovers(now) == Some(true) && !asked && !vehicle.inertial.contradicts(now);
+        let judged = judged && libm::fabsf(is) < OVERTURNED_RAD;
         if judged || !is.is_finite() { is.to_degrees().abs() } else { 0.0 }
     };
     Reading::new(vehicle.attitude.at(), vehicle.attitude.get().map(degrees))

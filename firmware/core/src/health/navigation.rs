@@ -166,7 +166,8 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()), unit: Unit::of("m"),
         debounce_ms: [200, 1_000], stale_s: None, instances: 1, of: InstanceKind::Vehicle,
         read: |inputs, _| inputs.derived.crosschecks.heights.receiver_leapt(inputs.now)),
-    row!("gps_hdop" GNSS, above(GpsHdopWarn _ 0.1), role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
+    // Nobody acts on a few seconds of it.
+    row!("gps_hdop" GNSS, above(GpsHdopWarn _ 0.1), role: Role::of(Group::GnssQuality, Group::GnssLost.bit()), told_after_s: 10,
     read: |inputs, receiver| {
         let little = inputs.params.get(Param::GpsHdopWarn) - MARGIN;
         gnss(inputs, receiver, |gnss| {

@@ -14,6 +14,8 @@ rotors | disarmed before it lies still | impact | down | 0-3.3 c=-6 h=20..0.2; 3
 rotors | a hard landing | - | landed | HARD
 rotors | a landing that legs take, though it moves sideways | - | landed | 0-7.8 ground=3.3 c=-2.5 h=20..0.5; 7.8 c=0 h=0.2 thr=0 ground=0 rates=0; 7.8-7.9 load=3.8
 rotors | a jolt, shaking, and a landing | - | landed | 0-0.5 ground=4; 0.5 ground=1; 0.5-31%2:0-0.05 load=4.2; 30 h=0.1 thr=0 c=0 ground=0 rates=0 landed=ground; 33 off
+rotors | a hop, and it lies at 45 degrees | impact | down | 0-2 c=-1.5 h=3..0; 2 c=0 h=0 thr=0 ground=0 rates=0 load=0.7 drag=0.7; 2-2.1 load=6
+rotors | a hop onto a slope of 20 degrees | - | landed | 0-2 c=-1.5 h=3..0; 2 c=0 h=0 thr=0 ground=0 rates=0 load=0.94 drag=0.34; 2-2.1 load=6; 3 landed=ground; 5 off
 wings | it lands without throttle and skids | - | any | 0-2 ground=11.5 c=-0.4 h=0.8..0; 2 c=0 h=0 ground=0; 2-3.44 ground=11.5..0; 2-2.1 load=10.8; 3.5 rates=0; 0 thr=0.05
 wings | the same with throttle | impact | any | 0-2 ground=11.5 c=-0.4 h=0.8..0; 2 c=0 h=0 ground=0; 2-3.44 ground=11.5..0; 2-2.1 load=10.8; 3.5 rates=0; 0 thr=0.6; 3.6 landed=ground
 wings | it stops | impact | any | 0 thr=0; 0-1 ground=20; 1 ground=0 h=0.5 rates=0; 1-1.1 load=6

@@ -26,8 +26,11 @@ fn turning_over_is_told_unless_a_pilot_a_plane_or_a_hand_does_it() {
         let lies = fly(of, stopped);
         assert!(lies.told().contains(&"overturned"), "{of}: {:?}", lies.changes);
     }
-    let tilt_deg = fly(ROTORS[0], "0-1.5 roll=2.5 rates=3,0.5,0").first("overturned").value;
+    let outcome = fly(ROTORS[0], "0-1.5 roll=2.5 rates=3,0.5,0");
+    let tilt_deg = outcome.first("overturned").value;
     assert!((tilt_deg - 143.2).abs() < 1.0, "{tilt_deg}");
+    let is_roll = |finding: &Finding| finding.check == "roll";
+    assert!(!outcome.findings.iter().any(is_roll), "an attitude is not wrong: {:?}", outcome.findings);
 }
 
 #[test]
