@@ -290,7 +290,7 @@ impl Flight {
         let event = match self.stage {
             Stage::Down => self.close(),
             Stage::Falling | Stage::Impacted => self.hold(now),
-            _ if self.watch.is_some() || self.may_have_hit() => self.hold(now),
+            _ if self.watch.is_some() || self.shock.is_some_and(|shock| shock.has_hit) => self.hold(now),
             _ => self.advance(now, vehicle, votes),
         };
         self.note_touch(now, vehicle);
@@ -354,7 +354,8 @@ impl Flight {
     fn note_still(&mut self, now: BootMs, vehicle: &Vehicle) {
         let ground_mps = ground_speed_mps(now, vehicle).unwrap_or(0.0);
         let speed_mps = ground_mps.max(climb_mps(now, vehicle).map_or(0.0, f32::abs));
-        let was_hit = self.signs.worst[MishapKind::Impact as usize] > 0.0 || self.was_dropped();
+        let was_hit = self.signs.worst[MishapKind::Impact as usize] > 0.0
+            || self.shock.is_some_and(|shock| shock.dropped);
         let is_slow = speed_mps < STILL_MPS
             || (!self.arming.is_on && on_rotors(now, vehicle))
             || self.lies_on_its_back(vehicle)

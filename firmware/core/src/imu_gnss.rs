@@ -104,7 +104,7 @@ impl ImuGnssResidual {
         let step = self.at.age(at).filter(|step| *step > Millis::ZERO && *step <= PAUSE);
         self.at = Stamp::at(at);
         let missing = self.take_velocity(step, velocity, if on_rotors { 3 } else { 2 });
-        let shaken = SHAKE_PART * vehicle.inertial.shakes_mps2();
+        let shaken = SHAKE_PART * vehicle.inertial.step;
         if missing.is_some_and(|missing| !missing.is_finite()) {
             (self.at, self.residual) = (Stamp::NONE, None);
             return;

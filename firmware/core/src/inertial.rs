@@ -59,7 +59,7 @@ state! {
         pub(crate) force: [f32; 3],
         /// The last sample along the body's downward axis, and its smoothed step from sample to sample; m/s2.
         down: f32,
-        step: f32,
+        pub(crate) step: f32,
         steps_since: BootMs,
         /// The least step at rest; 0 if unknown.
         step_at_rest: f32,
@@ -166,10 +166,6 @@ impl Inertial {
     /// Whether it shakes less than on carrying rotors. Simulators have no noise: they are calm too.
     pub(crate) fn is_calm(&self, now: BootMs) -> bool {
         self.has_steps(now) && self.step < CALM_MPS2
-    }
-
-    pub(crate) const fn shakes_mps2(&self) -> f32 {
-        self.step
     }
 
     fn is_fresh(&self, now: BootMs) -> bool {

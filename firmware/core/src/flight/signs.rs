@@ -115,7 +115,7 @@ pub(super) struct Shock {
     pub(super) sink_mps: f32,
     stopped: bool,
     /// Little carried the vehicle just before.
-    dropped: bool,
+    pub(super) dropped: bool,
     /// It hit something, if it lies still soon.
     pub(super) has_hit: bool,
 }
@@ -431,14 +431,6 @@ impl Flight {
         let over = vehicle.inertial.lies_over(now)?;
         let turned = self.arming.stood && !vehicle.inertial.turns_little(now, DRIVEN);
         (turned && !is_fast(now, vehicle)).then_some(over)
-    }
-
-    pub(super) fn may_have_hit(&self) -> bool {
-        self.shock.is_some_and(|shock| shock.has_hit)
-    }
-
-    pub(super) fn was_dropped(&self) -> bool {
-        self.shock.is_some_and(|shock| shock.dropped)
     }
 
     /// Whether nothing carries it just now: a vehicle that flew is in the air, though its autopilot may call it landed.
