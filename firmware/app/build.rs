@@ -26,7 +26,7 @@ fn main() -> Result<(), String> {
     copy("memory.x", &out.join("memory.x"));
     let name = env::var("HUMS_BOARD").unwrap_or_else(|_| hums_boards::DEFAULT.to_owned());
     let board = hums_boards::find(&name).map_err(|why| format!("HUMS_BOARD: {why}"))?;
-    // Clippy checks the types of every board beside those of the image's.
+    // Clippy checks the types of every board beside the image's.
     let boards = hums_boards::all().iter().fold(code(board), |boards, other| {
         let code = code(other);
         format!("{boards}#[cfg(clippy)]\n#[allow(dead_code)]\nconst _: () = {{\n{code}}};\n")

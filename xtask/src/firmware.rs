@@ -156,10 +156,16 @@ pub(crate) fn files(
     Ok(files)
 }
 
-/// And the types of every board. A warning is an error.
+/// And the types of every board; the whole firmware is checked with those of a card on plain pins too. A warning is an error.
 pub(crate) fn lint() -> Result<()> {
     let others = ["--package", RESIDENT, "--package", CHIP, "--", "-D", "warnings"];
-    cargo(default_board())?.arg("clippy").args(cargo_arguments(APPLICATION)).args(others).run()
+    cargo(default_board())?.arg("clippy").args(cargo_arguments(APPLICATION)).args(others).run()?;
+    hums_boards::all().iter().find(|board| board.card.bus.is_none()).map_or(Ok(()), |board| {
+        cargo(board)?
+            .args(["check", "--quiet", "--package", RESIDENT])
+            .args(cargo_arguments(APPLICATION))
+            .run()
+    })
 }
 
 /// An unchanged image keeps its time, and nothing is made anew.
