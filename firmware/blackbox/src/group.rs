@@ -5,7 +5,7 @@ use hums_core::clock::Instant;
 use crate::chain;
 use crate::codec::{self, DecodedEntry, Frame, Kind, Model, Recall, SLOTS};
 use crate::coder::{Decoder, LOOKAHEAD, SymbolReader};
-use crate::layouts::Layouts;
+use crate::layouts;
 use crate::limits::ENTRY_BYTES_MAX;
 use crate::preamble::{PREAMBLE_BYTES, Preamble};
 use crate::record::Record;
@@ -96,8 +96,6 @@ pub struct GroupDecoder {
     is_unchecked: bool,
     frames: u32,
     preamble: Preamble,
-    /// The table of the group before, and its hash.
-    layouts: Option<(u32, Layouts)>,
     entry: [u8; ENTRY_BYTES_MAX],
     decoded: DecodedEntry,
     apart: Option<usize>,
@@ -120,7 +118,6 @@ impl GroupDecoder {
             is_unchecked: false,
             frames: 0,
             preamble: Preamble::default(),
-            layouts: None,
             entry: [0; ENTRY_BYTES_MAX],
             decoded: DecodedEntry { kind: Kind::Record, at_ms: 0, len: 0 },
             apart: None,
@@ -150,14 +147,10 @@ impl GroupDecoder {
         let body = sector.body().get(..header.body_bytes).unwrap_or_default();
         self.preamble = Preamble::read(body).ok_or(GroupError::Corrupt)?;
         (self.chain, self.is_unchecked) = (body.get(..PREAMBLE_BYTES).map(chain::begun), false);
-        let hash = self.preamble.layouts;
-        // Nearly all groups have the table of the one before, and to make its hash takes as long as a sector.
-        let layouts = match self.layouts {
-            Some((known, layouts)) if known == hash => layouts,
-            _ => Layouts::by_hash(hash).ok_or(GroupError::UnknownLayouts(hash))?,
-        };
-        self.layouts = Some((hash, layouts));
-        self.model.reset(self.preamble.start_ms, layouts);
+        if self.preamble.layouts != layouts::CURRENT {
+            return Err(GroupError::UnknownLayouts(self.preamble.layouts));
+        }
+        self.model.reset(self.preamble.start_ms);
         self.recall.reset();
         self.fill(header, sector);
         self.decoder = Decoder::new(self.stream(), PREAMBLE_BYTES);

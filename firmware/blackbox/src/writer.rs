@@ -13,7 +13,7 @@ use crate::bytes::copy_few;
 use crate::chain;
 use crate::codec::{CODED_BYTES_MAX, CodedEntry, Frame, Kind, Model, Out};
 use crate::coder::{Encoder, FLUSH_MAX, LOOKAHEAD};
-use crate::layouts::{self, Layouts};
+use crate::layouts;
 use crate::preamble::{PREAMBLE_BYTES, Preamble};
 use crate::record::{Mark, MarkReason, RECORD_BYTES_MAX, Record};
 use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, RECORDS_MAX, Sector};
@@ -314,7 +314,7 @@ impl Writer {
         (self.header.since_first, self.header.check) = (0, self.chain);
         self.sector.body_mut()[..PREAMBLE_BYTES].copy_from_slice(&preamble);
         self.header.body_bytes = PREAMBLE_BYTES;
-        self.model.reset(at_ms, Layouts::CURRENT);
+        self.model.reset(at_ms);
         self.coder = Encoder::new();
         self.in_group = true;
     }

@@ -50,21 +50,6 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them, by their number.
-    pub const ALL: [Self; 11] = [
-        Self::U8,
-        Self::I8,
-        Self::Char,
-        Self::U16,
-        Self::I16,
-        Self::U32,
-        Self::I32,
-        Self::F32,
-        Self::U64,
-        Self::I64,
-        Self::F64,
-    ];
-
     /// The size of one element in bytes: 1, 2, 4 or 8.
     pub const fn size(self) -> usize {
         match self {
@@ -88,11 +73,6 @@ pub enum Role {
     Millis,
     /// A time that advances with the clock, in microseconds.
     Micros,
-}
-
-impl Role {
-    /// All of them, by their number.
-    pub const ALL: [Self; 4] = [Self::Plain, Self::Instance, Self::Millis, Self::Micros];
 }
 
 /// One field of a message.
@@ -200,12 +180,6 @@ mod tests {
         assert_eq!(role(24, 0), Some(Role::Micros));
         assert_eq!(role(251, 2), Some(Role::Instance));
         assert_eq!(role(30, 1), Some(Role::Plain));
-    }
-
-    #[test]
-    fn kinds_and_roles_stand_at_their_number() {
-        assert!(Kind::ALL.iter().enumerate().all(|(number, kind)| *kind as usize == number));
-        assert!(Role::ALL.iter().enumerate().all(|(number, role)| *role as usize == number));
     }
 
     #[test]

@@ -1,21 +1,19 @@
 //! From a message's layout to the elements of its slot.
 
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;
-use hums_dialect::{Kind, Role};
+use hums_dialect::{Field, Kind, Message, Role};
 
 use super::body::Body;
 use super::element::{Element, ElementKind};
 use super::links;
 use super::slots::{INSTANCE_BYTES, Key, Slot};
-use crate::layouts::{FieldLayout, Layout, LayoutIndex};
 
 /// Arrays of this many bytes or more are data, not numbers.
-const DATA_BYTES: u8 = 16;
+const DATA_BYTES: usize = 16;
 
-pub(super) fn instance_of(layout: Layout) -> Option<(usize, usize)> {
+pub(super) fn instance_of(message: &Message) -> Option<(usize, usize)> {
     let mut offset = 0;
-    for index in 0.. {
-        let field = layout.field(index)?;
+    for field in message.fields {
         if field.role == Role::Instance {
             return (field.size() <= INSTANCE_BYTES).then_some((offset, field.size()));
         }
@@ -24,14 +22,14 @@ pub(super) fn instance_of(layout: Layout) -> Option<(usize, usize)> {
     None
 }
 
-fn elements_of(field: FieldLayout) -> (ElementKind, u8, u8) {
+fn elements_of(field: &Field) -> (ElementKind, u8, u8) {
     let whole = |what| (what, 1, field.size() as u8);
     if field.role == Role::Instance && field.size() <= INSTANCE_BYTES {
         return whole(ElementKind::Instance);
     }
     let what = match (field.kind, field.role) {
         (Kind::Char, _) => return whole(ElementKind::Text),
-        (Kind::U8 | Kind::I8, _) if field.count >= DATA_BYTES => return whole(ElementKind::Text),
+        (Kind::U8 | Kind::I8, _) if field.count() >= DATA_BYTES => return whole(ElementKind::Text),
         (Kind::U8 | Kind::I8, _) => ElementKind::Integer1,
         (Kind::U16 | Kind::I16, _) => ElementKind::Integer2,
         (Kind::F32, _) => ElementKind::Float,
@@ -41,41 +39,39 @@ fn elements_of(field: FieldLayout) -> (ElementKind, u8, u8) {
         (_, Role::Millis | Role::Micros) => ElementKind::WideTime,
         _ => ElementKind::Wide,
     };
-    (what, field.count, field.kind.size() as u8)
+    (what, field.count() as u8, field.kind.size() as u8)
 }
 
 impl Body {
-    pub(super) fn describe(&mut self, key: Key, place: Option<LayoutIndex>, layout: Option<Layout>) -> Slot {
+    pub(super) fn describe(&mut self, key: Key, message: Option<&Message>) -> Slot {
         let (mut count, mut described) = (0, 0);
-        let mut index = 0;
-        while let Some(field) = layout.and_then(|layout| layout.field(index)) {
+        for field in message.map_or(&[][..], |message| message.fields) {
             let (what, elements, _) = elements_of(field);
             count += usize::from(elements) * if what.is_wide() { 2 } else { 1 };
             described += field.size();
-            index += 1;
         }
         let fits = u8::try_from(count).is_ok() && described <= PAYLOAD_BYTES_MAX;
-        let room = layout.filter(|_| fits).and_then(|layout| Some((layout, self.elements.claim(count)?)));
-        let Some((layout, first)) = room else {
-            let mut slot = Slot::new(key, None, None, 0, 0);
-            if let Some(layout) = layout {
-                slot.seed = layout.crc_extra();
+        let room = message.filter(|_| fits).and_then(|message| Some((message, self.elements.claim(count)?)));
+        let Some((message, first)) = room else {
+            let mut slot = Slot::new(key, None, 0, 0);
+            if let Some(message) = message {
+                slot.seed = message.crc_extra;
                 (slot.verified, slot.own_seed) = (true, true);
             }
             return slot;
         };
-        self.prepare(key.id, layout, usize::from(first));
-        let mut slot = Slot::new(key, place, Some(layout), first, described);
+        self.prepare(message, usize::from(first));
+        let mut slot = Slot::new(key, Some(message), first, described);
         slot.elements_count = count as u8;
         slot
     }
 
-    fn prepare(&mut self, id: u32, layout: Layout, first: usize) {
-        let (mut at, mut end, mut index) = (first, 0, 0);
-        while let Some(field) = layout.field(index) {
+    fn prepare(&mut self, message: &Message, first: usize) {
+        let (mut at, mut end) = (first, 0);
+        for field in message.fields {
             let (what, count, size) = elements_of(field);
             for _ in 0..count {
-                let row = links::row_of(id, end);
+                let row = links::row_of(message.id, end);
                 end += usize::from(size);
                 let detail =
                     if matches!(what, ElementKind::Text | ElementKind::Instance) { size } else { row };
@@ -89,7 +85,6 @@ impl Body {
                 }
                 at += if what.is_wide() { 2 } else { 1 };
             }
-            index += 1;
         }
     }
 }

@@ -28,7 +28,6 @@ use zerocopy::FromZeros;
 
 use crate::coder::{Coder, Encoder, Scratch, SymbolReader, SymbolWriter};
 use crate::distribution::Cdf;
-use crate::layouts::Layouts;
 use crate::limits::ENTRY_BYTES_MAX;
 
 /// Largest coded size of an entry, bytes. A longer entry starts a new group, where its bytes are stored uncoded: with
@@ -64,7 +63,6 @@ pub(crate) type Out = Scratch<CODED_BYTES_MAX>;
 /// Common to writer and reader, about the group so far. Zeros until the first [`Self::reset`].
 #[derive(FromZeros)]
 pub(crate) struct Model {
-    layouts: Layouts,
     last_ms: u64,
     slots: Slots,
     headers: Headers,
@@ -76,8 +74,7 @@ pub(crate) struct Model {
 const TIME: Cdf = Cdf::from_sizes([40, 10, 6, 4, 4, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 1]);
 
 impl Model {
-    pub(crate) fn reset(&mut self, at_ms: u64, layouts: Layouts) {
-        self.layouts = layouts;
+    pub(crate) fn reset(&mut self, at_ms: u64) {
         self.last_ms = at_ms;
         self.slots.reset();
         self.headers.reset();
@@ -155,8 +152,7 @@ impl Model {
         }
         let sender = self.slots.sender(frame.system, frame.component)?;
         let mut key = Key { id: frame.id, v2: frame.v2, sender, instance: [0; INSTANCE_BYTES] };
-        let layout = self.layouts.find(key.id).and_then(|place| self.layouts.at(place));
-        if let Some((offset, size)) = layout.and_then(describe::instance_of) {
+        if let Some((offset, size)) = hums_dialect::message(key.id).and_then(describe::instance_of) {
             key.instance[..size].copy_from_slice(frame.payload.get(offset..offset + size)?);
         }
         self.slots.has_room().then_some((NextEntry::NewSlot, key))
@@ -288,13 +284,12 @@ impl Model {
         let id = if short { coder.bits16(key.id, 9) } else { coder.bits(key.id, 24) };
         let sender = self.slots.sender(system, component)?;
         let mut key = Key { id, v2, sender, instance: key.instance };
-        let place = self.layouts.find(key.id);
-        let layout = place.and_then(|place| self.layouts.at(place));
-        let (instance_at, instance) = layout.and_then(describe::instance_of).unwrap_or((0, 0));
+        let message = hums_dialect::message(key.id);
+        let (instance_at, instance) = message.and_then(describe::instance_of).unwrap_or((0, 0));
         for place in key.instance.get_mut(..instance)? {
             *place = coder.bits16(u32::from(*place), 8) as u8;
         }
-        let mut slot = self.body.describe(key, place, layout);
+        let mut slot = self.body.describe(key, message);
         (slot.instance_at, slot.instance_size) = (instance_at as u8, instance as u8);
         self.slots.add(slot)
     }

@@ -1,12 +1,12 @@
 //! Slots: each stream of one message from one sender (and one instance, for messages with several). A slot stores the
 //! shape of its last frame, and the order of slots.
 
+use hums_dialect::Message;
 use zerocopy::FromZeros;
 
 use super::frame::Frame;
 use crate::coder::Coder;
 use crate::distribution::{Cdf, Cell};
-use crate::layouts::{Layout, LayoutIndex};
 use crate::zeros;
 
 /// Slots at most. Further streams are coded as plain bytes.
@@ -37,7 +37,7 @@ pub(crate) enum Length {
 #[derive(Clone, Copy, FromZeros)]
 pub(crate) struct Slot {
     pub(crate) key: Key,
-    pub(crate) layout: Option<LayoutIndex>,
+    pub(crate) has_layout: bool,
     pub(crate) elements: u16,
     pub(crate) elements_count: u8,
     /// The distribution of the times before its frames; 0: none yet.
@@ -67,23 +67,18 @@ pub(crate) struct Slot {
 pub(crate) const NONE: u8 = u8::MAX;
 
 impl Slot {
-    pub(crate) fn new(
-        key: Key,
-        place: Option<LayoutIndex>,
-        layout: Option<Layout>,
-        elements: u16,
-        described: usize,
-    ) -> Self {
-        let len_base = layout.map_or(0, Layout::len_base);
+    pub(crate) fn new(key: Key, message: Option<&Message>, elements: u16, described: usize) -> Self {
+        let has_layout = message.is_some();
+        let len_base = message.map_or(0, |message| message.len_base);
         Self {
             key,
-            layout: place,
+            has_layout,
             elements,
             described: described as u8,
-            seed: layout.map_or(0, Layout::crc_extra),
-            own_seed: layout.is_some(),
-            verified: layout.is_some(),
-            length: if key.v2 && layout.is_some() { Length::Trimmed } else { Length::Fixed(len_base as u8) },
+            seed: message.map_or(0, |message| message.crc_extra),
+            own_seed: has_layout,
+            verified: has_layout,
+            length: if key.v2 && has_layout { Length::Trimmed } else { Length::Fixed(len_base) },
             calm: Cell::EVEN,
             next: [NONE; 2],
             ..zeros()
