@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 /// Some thousands of frames over several groups, seconds of Python.
 const RECORDING_BYTES: usize = 250_000;
 
-const TABLES: [&str; 11] = [
+const TABLES: [&str; 10] = [
     "HUMS_BOOT",
     "HUMS_VEHICLE",
     "HUMS_PARAM",
@@ -25,7 +25,6 @@ const TABLES: [&str; 11] = [
     "HUMS_FAULT",
     "HUMS_EVENT",
     "HUMS_NOTE",
-    "HUMS_KEEP",
 ];
 
 /// Returns the number of frames and records.

@@ -118,7 +118,14 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         Record::Lifetime(life) => wear::lifetime(life),
         Record::Exceedance(exceedance) => wear::exceedance(exceedance),
         Record::Component(component) => vec![wear::component(component)],
-        Record::Keep(_) | Record::Mark(_) => extent_rows(record),
+        Record::Mark(mark) => one(
+            "HUMS_MARK",
+            vec![
+                ("why", text(mark.why.name())),
+                ("sector", count(mark.sector)),
+                ("frames", count(mark.frames)),
+            ],
+        ),
         Record::Protection(protection) => one(
             "HUMS_PROTECTION",
             vec![
@@ -133,29 +140,6 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
             vec![("kind", count(*kind)), ("version", count(*version)), ("bytes", Cell::Hex(bytes.to_vec()))],
         ),
         // A kind that this version of the host tools has no table for; the record itself stays in the log.
-        _ => Vec::new(),
-    }
-}
-
-fn extent_rows(record: &Record<'_>) -> Vec<Row> {
-    let one = |table, cells| vec![Row::new(table, cells)];
-    match record {
-        Record::Keep(keep) => one(
-            "HUMS_KEEP",
-            vec![
-                ("all", count(u8::from(keep.all))),
-                ("from_sector", count(keep.from)),
-                ("seconds", count(keep.seconds)),
-            ],
-        ),
-        Record::Mark(mark) => one(
-            "HUMS_MARK",
-            vec![
-                ("why", text(mark.why.name())),
-                ("sector", count(mark.sector)),
-                ("frames", count(mark.frames)),
-            ],
-        ),
         _ => Vec::new(),
     }
 }

@@ -40,7 +40,6 @@ RECORDS = {
     9: ("HUMS_FAULT", {"kind": FAULTS, "task": "text", "place": "text", "registers": -48, "message": "text"}),
     10: ("HUMS_EVENT", {"event": EVENTS, "text": "text"}),
     11: ("HUMS_NOTE", {"severity": "B", "text": "text"}),
-    15: ("HUMS_KEEP", {"all": "B", "from_sector": "I", "seconds": "I"}),
     18: ("HUMS_MARK", {"why": RESTING, "sector": "I", "frames": "I"}),
 }
 

@@ -7,7 +7,6 @@
 
 mod boot;
 mod finding;
-mod keep;
 mod loss;
 mod mark;
 mod protection;
@@ -21,7 +20,6 @@ use core::fmt;
 pub use crate::limits::{NAME_BYTES_MAX, RECORD_BYTES_MAX, TEXT_BYTES_MAX};
 pub use boot::{Boot, Fault, LastSession, PreviousEnd};
 pub use finding::{Event, FindingRecord, Note};
-pub use keep::Keep;
 pub use loss::{Loss, LossKind, Stats};
 pub use mark::{Mark, MarkReason};
 pub use protection::Protection;
@@ -111,9 +109,7 @@ records! {
     13 Exceedance(Exceedance<'a>),
     /// A part that wears.
     14 Component(Component<'a>),
-    /// The stored part of the session.
-    15 Keep(Keep),
-    /// A step of the protective action; 16 is retired.
+    /// A step of the protective action; 15 and 16 are retired.
     17 Protection(Protection),
     /// The log is whole up to here.
     18 Mark(Mark),
@@ -264,7 +260,6 @@ mod tests {
             }),
             0x5616,
         );
-        reads_back(Record::Keep(Keep { all: true, from: 70_000, seconds: 30 }), 0x44e5);
         let (action, stage) = (Action::Land, Stage::Answered);
         reads_back(Record::Protection(Protection { action, stage, detail: 4, command: 21 }), 0x1a6d);
         reads_back(Record::Unknown { kind: 200, version: 3, bytes: &[1, 2, 3] }, 0x5fe5);

@@ -30,9 +30,12 @@ pub(crate) struct Shape {
 impl Shape {
     /// The shape with the bytes after the numbers; `None` unless all numbers are there.
     pub(crate) fn read(stored: &[u8]) -> Option<(Self, usize)> {
-        let [kind, version, words, halves] = *stored.first_chunk()?;
-        let shape = Self { kind, version, words, halves };
+        let shape = Self::of(*stored.first_chunk()?);
         Some((shape, stored.len().checked_sub(shape.bytes_at())?))
+    }
+
+    const fn of([kind, version, words, halves]: [u8; HEAD_BYTES]) -> Self {
+        Self { kind, version, words, halves }
     }
 
     /// Words that are times, a pair each: first the lower half.
@@ -57,12 +60,7 @@ pub(crate) struct Fields<'a> {
 
 impl<'a> Fields<'a> {
     pub(crate) fn new(stored: &'a [u8]) -> (Shape, Self) {
-        let mut head = [0; HEAD_BYTES];
-        for (place, byte) in head.iter_mut().zip(stored) {
-            *place = *byte;
-        }
-        let [kind, version, words, halves] = head;
-        let shape = Shape { kind, version, words, halves };
+        let shape = Shape::of(ByteFields::new(stored).array());
         let part = |from: usize, to: usize| {
             let to = to.min(stored.len());
             stored.get(from.min(to)..to).unwrap_or_default()
