@@ -27,6 +27,8 @@ pub mod decoder;
 pub mod file;
 pub mod find;
 pub mod framer;
+#[path = "../../firmware/blackbox/tests/common/log.rs"]
+mod log;
 pub mod mutate;
 pub mod page;
 pub mod reader;

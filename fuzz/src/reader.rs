@@ -1,6 +1,8 @@
 //! Any file through the reader of logs: reading ends, and counts each block by kind.
 
-use hums_blackbox::{Header, Item, LogReader, SECTOR_BYTES, Sector};
+use hums_blackbox::{Header, SECTOR_BYTES, Sector};
+
+use crate::log;
 
 /// The first byte's lowest bit selects whether checks are corrected, so that the content is reached; the others are
 /// the file.
@@ -19,33 +21,11 @@ pub fn check(data: &[u8]) {
     let said: u64 =
         blocks.iter().filter_map(|block| Some(u64::from(Header::read(block).ok()?.entries()))).sum();
     let items_max = said + 2 * blocks.len() as u64 + 4;
-    let mut reader = Box::new(LogReader::new());
-    let (mut items, mut entries, mut gaps) = (0, 0, 0);
-    let mut feed = blocks.iter();
-    let end = loop {
-        match feed.next() {
-            Some(block) => reader.feed(block),
-            None => reader.end(),
-        }
-        let mut end = None;
-        while let Some(item) = reader.next() {
-            items += 1;
-            assert!(items <= items_max, "more items than there can be");
-            match item {
-                Item::Frame { .. } | Item::Record { .. } => entries += 1,
-                Item::Gap(_) => gaps += 1,
-                Item::End(summary) => {
-                    end = Some(summary);
-                    break;
-                }
-            }
-        }
-        if let Some(end) = end {
-            break end;
-        }
-    };
-    assert_eq!(end.frames + end.records, entries);
-    assert_eq!(end.gaps, gaps);
+    let mut items = 0;
+    let end = log::read(&blocks, |_| {
+        items += 1;
+        assert!(items <= items_max, "more items than there can be");
+    });
     let seen = end.blocks;
     let ours = seen.sectors + seen.superseded + seen.misplaced + seen.damaged;
     let kinds = ours + seen.stale + seen.unsound + seen.empty + seen.erased + seen.foreign;

@@ -1,7 +1,9 @@
 //! Any pieces of bytes, most of them no frames, through writer and reader: they come back unchanged.
 
-use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Sector, SectorSink, Writer};
+use hums_blackbox::{Entry, FRAME_BYTES_MAX, Sector, SectorSink, Writer};
 use hums_core::clock::Instant;
+
+use crate::log::{self, Item};
 
 #[derive(Default)]
 struct Card(Vec<Sector>);
@@ -47,27 +49,14 @@ pub fn check(data: &[u8]) {
         writer.frame(Instant::from_millis(*at_ms), bytes, false, &mut card).expect("room");
     }
     assert!(writer.finish(&mut card));
-    let mut reader = Box::new(LogReader::new());
     let mut expected = pieces.iter();
-    let mut sectors = card.0.iter();
-    loop {
-        match sectors.next() {
-            Some(sector) => reader.feed(sector.bytes()),
-            None => reader.end(),
+    let end = log::read(card.0.iter().map(Sector::bytes), |item| match item {
+        Item::Entry(Entry::Frame { at, bytes, verified }) => {
+            let (at_ms, frame) = expected.next().expect("no more frames than were written");
+            assert_eq!((at.as_millis(), bytes, verified), (*at_ms, &frame[..], false));
         }
-        while let Some(item) = reader.next() {
-            match item {
-                Item::Frame { at, bytes, verified, .. } => {
-                    let (at_ms, frame) = expected.next().expect("no more frames than were written");
-                    assert_eq!((at.as_millis(), bytes, verified), (*at_ms, &frame[..], false));
-                }
-                Item::Record { .. } => unreachable!("none was written"),
-                Item::Gap(gap) => unreachable!("nothing is missing: {gap:?}"),
-                Item::End(end) => {
-                    assert!(end.closed && expected.next().is_none());
-                    return;
-                }
-            }
-        }
-    }
+        Item::Entry(Entry::Record { .. }) => unreachable!("none was written"),
+        Item::Gap(gap) => unreachable!("nothing is missing: {gap:?}"),
+    });
+    assert!(end.closed && expected.next().is_none());
 }

@@ -9,6 +9,8 @@
 
 #[path = "../tests/common/card.rs"]
 mod card;
+#[path = "../tests/common/log.rs"]
+mod log;
 
 use std::error::Error;
 use std::io::Write;
@@ -17,8 +19,9 @@ use std::process::{Command, ExitCode, Stdio};
 
 use card::Card;
 use hums_blackbox::record::{Boot, Clock, Stats, Vehicle};
-use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
+use hums_blackbox::{Entry, Record, SECTOR_BYTES, Writer};
 use hums_core::clock::Instant;
+use log::Item;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
@@ -46,7 +49,8 @@ fn main() -> Result<ExitCode> {
         let frames = frames(&tlog);
         let log = pack(&frames)?;
         let mut tlog_again = Vec::with_capacity(tlog.len());
-        unpack(&log, &mut tlog_again)?;
+        let epoch = frames.first().map_or(0, |(at, _)| *at);
+        unpack(&log, epoch, &mut tlog_again)?;
         compare(&frames, &tlog_again)?;
         let xz = if quick { f64::NAN } else { filter("xz", &["-9ec"], &tlog)?.len() as f64 };
         let signed = frames.iter().filter(|frame| matches!(frame.1, [0xfd, _, 1, ..])).count();
@@ -160,27 +164,21 @@ fn checks(frame: &[u8]) -> bool {
     frame.get(end..end + 2) == Some(&crc.to_le_bytes()[..])
 }
 
-fn unpack(log: &[u8], tlog: &mut Vec<u8>) -> Result<()> {
-    let mut reader = Box::new(LogReader::new());
-    let (blocks, _) = log.as_chunks::<SECTOR_BYTES>();
-    let mut blocks = blocks.iter();
-    loop {
-        match blocks.next() {
-            Some(block) => reader.feed(block),
-            None => reader.end(),
+/// `epoch`: UTC at power-on.
+fn unpack(log: &[u8], epoch: u64, tlog: &mut Vec<u8>) -> Result<()> {
+    let mut gaps = Vec::new();
+    let end = log::read(log.as_chunks::<SECTOR_BYTES>().0, |item| match item {
+        Item::Entry(Entry::Frame { at, bytes, .. }) => {
+            tlog.extend_from_slice(&(epoch + at.as_micros()).to_be_bytes());
+            tlog.extend_from_slice(bytes);
         }
-        while let Some(item) = reader.next() {
-            match item {
-                Item::Frame { utc_micros, bytes, .. } => {
-                    tlog.extend_from_slice(&utc_micros.ok_or("no clock")?.to_be_bytes());
-                    tlog.extend_from_slice(bytes);
-                }
-                Item::Gap(gap) => return Err(format!("{gap:?}").into()),
-                Item::Record { .. } => {}
-                Item::End(_) => return Ok(()),
-            }
-        }
+        Item::Entry(Entry::Record { .. }) => {}
+        Item::Gap(gap) => gaps.push(gap),
+    });
+    if end.epoch_micros != Some(epoch) {
+        return Err(format!("the clock is {:?}", end.epoch_micros).into());
     }
+    if gaps.is_empty() { Ok(()) } else { Err(format!("{gaps:?}").into()) }
 }
 
 fn compare(expected: &[Frame<'_>], tlog: &[u8]) -> Result<()> {

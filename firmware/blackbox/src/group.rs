@@ -194,7 +194,7 @@ impl GroupDecoder {
         Some(Ok(Outline::Whole(self.entry())))
     }
 
-    pub(crate) fn advance(&mut self) -> Option<Result<(), GroupError>> {
+    fn advance(&mut self) -> Option<Result<(), GroupError>> {
         let last = self.last?;
         if core::mem::take(&mut self.is_unchecked) {
             // It was not given out whole.
@@ -226,7 +226,7 @@ impl GroupDecoder {
         }
     }
 
-    pub(crate) fn entry(&mut self) -> Entry<'_> {
+    fn entry(&mut self) -> Entry<'_> {
         if let Some(frame) = self.apart.take().and_then(|index| self.last_frames.get_mut(index)) {
             frame.assemble(self.recall.seed, &mut self.entry);
         }
@@ -247,10 +247,6 @@ impl GroupDecoder {
     /// Returned from this group so far.
     pub const fn frames(&self) -> u32 {
         self.frames
-    }
-
-    pub(crate) fn abandon(&mut self) {
-        self.last = None;
     }
 
     /// Preamble of the group.

@@ -1,7 +1,7 @@
 //! The black box's record: its format, its writer and its reader, in one crate, so that they cannot drift apart.
 //!
 //! ```text
-//! frames, records -> Writer -> sectors of 512 bytes -> card … blocks -> LogReader -> frames, records, gaps
+//! frames, records -> Writer -> sectors of 512 bytes -> card … blocks -> Assembler -> GroupDecoder -> frames, records
 //! ```
 //! * An *entry* is a frame as it was received or a record of the monitor's own, with its time.
 //! * The *model* (`codec`) predicts each entry from earlier ones and codes only the unpredicted part.
@@ -19,21 +19,21 @@ mod codec;
 mod coder;
 mod crc;
 mod distribution;
+mod gap;
 mod group;
 pub mod layouts;
 mod limits;
 pub mod parity;
 mod preamble;
-mod reader;
 pub mod record;
 mod sector;
 mod writer;
 
 pub use assemble::{Assembler, BlockCounts, PAGE_SECTORS, Step};
+pub use gap::{Cause, Gap};
 pub use group::{Entry, GroupDecoder, GroupError, Outline};
 pub use hums_dialect::wire::FRAME_BYTES_MAX;
 pub use preamble::Preamble;
-pub use reader::{Cause, Gap, Item, LogReader, Summary};
 pub use record::Record;
 pub use sector::{BODY_BYTES, GROUP_SECTORS, Header, NotASector, SECTOR_BYTES, Sector, VERSION};
 pub use writer::{Counters, ENTRY_SECTORS_MAX, Full, SectorSink, Writer};

@@ -9,33 +9,24 @@ use common::Random;
 use frames::{Frame, checksum, frames_of};
 use hums_blackbox::record::{Clock, Note, RECORD_BYTES_MAX};
 use hums_blackbox::{
-    Assembler, Entry, FRAME_BYTES_MAX, GroupDecoder, Item, LogReader, Outline, Record, SECTOR_BYTES, Sector,
-    Writer,
+    Assembler, Entry, FRAME_BYTES_MAX, GroupDecoder, Outline, Record, SECTOR_BYTES, Sector, Writer,
 };
 use hums_core::clock::Instant;
 use proptest::prelude::*;
 
+use crate::log::{self, Item};
+
 fn read(sectors: &[Sector]) -> (Vec<Frame>, Vec<String>) {
-    let mut reader = Box::new(LogReader::new());
     let (mut frames, mut notes) = (Vec::new(), Vec::new());
-    let mut sectors = sectors.iter();
-    loop {
-        match sectors.next() {
-            Some(sector) => reader.feed(sector.bytes()),
-            None => reader.end(),
+    log::read(sectors.iter().map(Sector::bytes), |item| match item {
+        Item::Entry(Entry::Frame { at, bytes, verified }) => {
+            frames.push((at.as_millis(), bytes.to_vec(), verified));
         }
-        while let Some(item) = reader.next() {
-            match item {
-                Item::Frame { at, bytes, verified, .. } => {
-                    frames.push((at.as_millis(), bytes.to_vec(), verified));
-                }
-                Item::Record { record: Record::Note(note), .. } => notes.push(note.text.to_owned()),
-                Item::Record { .. } => {}
-                Item::Gap(gap) => panic!("{gap:?}"),
-                Item::End(_) => return (frames, notes),
-            }
-        }
-    }
+        Item::Entry(Entry::Record { record: Record::Note(note), .. }) => notes.push(note.text.to_owned()),
+        Item::Entry(Entry::Record { .. }) => {}
+        Item::Gap(gap) => panic!("{gap:?}"),
+    });
+    (frames, notes)
 }
 
 fn round_trip(frames: &[Frame]) -> usize {
@@ -312,26 +303,14 @@ fn records_of_any_shape_and_with_any_numbers_come_back() {
         writer.record(at, &Record::read(bytes), &mut card).expect("room");
     }
     writer.finish(&mut card);
-    let mut reader = Box::new(LogReader::new());
     let mut expected = stored.iter().enumerate();
-    let mut sectors = card.0.iter();
-    let mut ended = false;
-    while !ended {
-        match sectors.next() {
-            Some(sector) => reader.feed(sector.bytes()),
-            None => reader.end(),
+    log::read(card.0.iter().map(Sector::bytes), |item| match item {
+        Item::Entry(Entry::Record { at, record }) => {
+            let (index, bytes) = expected.next().expect("no more than were written");
+            assert_eq!((at.as_millis(), record), (index as u64 * 7, Record::read(bytes)));
         }
-        while let Some(item) = reader.next() {
-            match item {
-                Item::Record { at, record, .. } => {
-                    let (index, bytes) = expected.next().expect("no more than were written");
-                    assert_eq!((at.as_millis(), record), (index as u64 * 7, Record::read(bytes)));
-                }
-                Item::End(_) => ended = true,
-                other => panic!("{other:?}"),
-            }
-        }
-    }
+        other => panic!("{other:?}"),
+    });
     assert_eq!(expected.next(), None);
 }
 
@@ -383,28 +362,16 @@ proptest! {
         for bit in first..first + burst {
             log[bit / 8] ^= 1 << (bit % 8);
         }
-        let mut reader = Box::new(LogReader::new());
-        let (mut gaps, mut closed, mut at) = (0, false, 0);
-        let mut check = |reader: &mut LogReader| {
-            while let Some(item) = reader.next() {
-                match item {
-                    Item::Frame { bytes, .. } => {
-                        let found = frames[at..].iter().position(|frame| frame.1 == bytes);
-                        at += found.expect("a frame of the stream, in order") + 1;
-                    }
-                    Item::Gap(_) => gaps += 1,
-                    Item::End(summary) => closed = summary.closed,
-                    Item::Record { .. } => {}
-                }
+        let (mut gaps, mut at) = (0, 0);
+        let end = log::read(log.as_chunks::<SECTOR_BYTES>().0, |item| match item {
+            Item::Entry(Entry::Frame { bytes, .. }) => {
+                let found = frames[at..].iter().position(|frame| frame.1 == bytes);
+                at += found.expect("a frame of the stream, in order") + 1;
             }
-        };
-        for block in log.as_chunks::<SECTOR_BYTES>().0 {
-            reader.feed(block);
-            check(&mut reader);
-        }
-        reader.end();
-        check(&mut reader);
+            Item::Gap(_) => gaps += 1,
+            Item::Entry(Entry::Record { .. }) => {}
+        });
         // If the last sector's header has lost its session and its number, the log is not closed.
-        prop_assert!(gaps >= 1 || !closed);
+        prop_assert!(gaps >= 1 || !end.closed);
     }
 }

@@ -3,12 +3,12 @@
 use std::collections::HashSet;
 
 use hums_blackbox::record::{Mark, MarkReason, Note};
-use hums_blackbox::{
-    Cause, ENTRY_SECTORS_MAX, Full, Item, LogReader, Record, Sector, SectorSink, Summary, Writer,
-};
+use hums_blackbox::{Cause, ENTRY_SECTORS_MAX, Entry, Full, Record, Sector, SectorSink, Writer};
 use hums_core::clock::Instant;
 use hums_dialect::crc;
 use proptest::prelude::*;
+
+use crate::log::{self, End, Item};
 
 const SESSION: u32 = 0xfeed_0001;
 
@@ -71,32 +71,20 @@ struct Log {
     frames: Vec<Frame>,
     gaps: Vec<hums_blackbox::Gap>,
     notes: Vec<String>,
-    end: Option<Summary>,
+    end: End,
 }
 
 fn read<'a>(blocks: impl IntoIterator<Item = &'a [u8; 512]>) -> Log {
-    let (mut reader, mut log) = (Box::new(LogReader::new()), Log::default());
-    let mut blocks = blocks.into_iter();
-    loop {
-        match blocks.next() {
-            Some(block) => reader.feed(block),
-            None => reader.end(),
+    let mut log = Log::default();
+    log.end = log::read(blocks, |item| match item {
+        Item::Entry(Entry::Frame { at, bytes, verified }) => {
+            log.frames.push((at.as_millis(), bytes.to_vec(), verified));
         }
-        while let Some(item) = reader.next() {
-            match item {
-                Item::Frame { at, bytes, verified, .. } => {
-                    log.frames.push((at.as_millis(), bytes.to_vec(), verified));
-                }
-                Item::Record { record: Record::Note(note), .. } => log.notes.push(note.text.to_owned()),
-                Item::Record { .. } => {}
-                Item::Gap(gap) => log.gaps.push(gap),
-                Item::End(summary) => {
-                    log.end = Some(summary);
-                    return log;
-                }
-            }
-        }
-    }
+        Item::Entry(Entry::Record { record: Record::Note(note), .. }) => log.notes.push(note.text.to_owned()),
+        Item::Entry(Entry::Record { .. }) => {}
+        Item::Gap(gap) => log.gaps.push(gap),
+    });
+    log
 }
 
 fn bytes(sectors: &[Sector]) -> Vec<[u8; 512]> {
@@ -116,9 +104,7 @@ fn a_clean_log_reads_back_over_several_groups() {
     let log = read(&bytes(&sectors));
     assert_eq!(log.frames, frames);
     assert_eq!(log.gaps, []);
-    let end = log.end.expect("the last item");
-    assert!(end.closed);
-    assert_eq!(end.frames, 3_000);
+    assert!(log.end.closed);
     let counted: u32 = sectors.iter().map(|sector| u32::from(sector.frames())).sum();
     assert_eq!(counted, 3_000);
 }
@@ -133,7 +119,7 @@ fn a_log_that_stops_anywhere_reads_up_to_its_last_full_sector() {
             blocks[..len].iter().map(|block| usize::from(Sector::from_bytes(*block).frames())).sum();
         assert_eq!(log.frames, frames[..counted], "{len} sectors");
         assert_eq!(log.gaps, []);
-        assert!(!log.end.expect("end").closed);
+        assert!(!log.end.closed);
     }
 }
 
@@ -219,7 +205,7 @@ fn stale_sectors_and_zeros_after_the_end_are_no_part_of_the_log() {
     let log = read(&blocks);
     assert_eq!(log.frames, new);
     assert_eq!(log.gaps, []);
-    let counts = log.end.expect("end").blocks;
+    let counts = log.end.blocks;
     assert_eq!((counts.empty, counts.stale), (1, old.len() as u64));
 }
 
@@ -309,7 +295,7 @@ fn a_page_in_a_wrong_place_costs_no_more_than_the_groups_that_it_touches() {
                 assert!(is_subsequence(&log.frames, &frames), "{what}");
                 let lost = frames.len() - log.frames.len();
                 assert!(lost <= 4 * group, "{what}: {lost} frames of {} lost", frames.len());
-                let end = log.end.expect("end");
+                let end = &log.end;
                 let noticed = end.blocks.misplaced > 0 || !log.gaps.is_empty() || !end.closed;
                 assert!(noticed, "{what}: {end:?}");
             }
@@ -330,7 +316,7 @@ fn sectors_behind_the_first_of_a_ring_are_left_over_and_not_misplaced() {
     few.extend_from_slice(&blocks[40..60]);
     for medium in [medium, few] {
         let log = read(&medium);
-        assert_eq!((log.gaps.len(), log.end.expect("end").blocks.misplaced), (0, 0));
+        assert_eq!((log.gaps.len(), log.end.blocks.misplaced), (0, 0));
         assert!(!log.frames.is_empty() && !is_subsequence(&log.frames[..1], &frames[..1_000]));
     }
 }
@@ -352,22 +338,12 @@ fn an_end_mark_says_how_many_frames_came_before_it_and_is_read_from_the_copy_in_
         for sector in &mut sectors {
             sector.seal(SESSION);
         }
-        let (mut reader, mut frames, mut last) = (Box::new(LogReader::new()), 0, None);
-        let mut take = |reader: &mut LogReader| {
-            while let Some(item) = reader.next() {
-                match item {
-                    Item::Frame { .. } => frames += 1,
-                    Item::Record { record: Record::Mark(mark), .. } => last = Some((mark, frames)),
-                    _ => {}
-                }
-            }
-        };
-        for sector in &sectors {
-            reader.feed(sector.bytes());
-            take(&mut reader);
-        }
-        reader.end();
-        take(&mut reader);
+        let (mut frames, mut last) = (0, None);
+        log::read(sectors.iter().map(Sector::bytes), |item| match item {
+            Item::Entry(Entry::Frame { .. }) => frames += 1,
+            Item::Entry(Entry::Record { record: Record::Mark(mark), .. }) => last = Some((mark, frames)),
+            _ => {}
+        });
         let (Mark { why, sector, frames }, read) = last.expect("a mark");
         assert_eq!((why, frames, read), (MarkReason::Landed, index as u32 + 1, index + 1));
         assert!(sector as usize + 1 >= queue.sectors.len(), "{sector}");

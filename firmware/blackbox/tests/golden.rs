@@ -9,9 +9,11 @@ use std::path::PathBuf;
 
 use card::Card;
 use hums_blackbox::record::{Boot, Clock, Moment, Note, Stats, Usage};
-use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
+use hums_blackbox::{Entry, Record, SECTOR_BYTES, Writer};
 use hums_core::clock::Instant;
 use hums_dialect::crc;
+
+use crate::log::{self, Item};
 
 fn stream() -> Vec<(u64, Vec<u8>, bool)> {
     let mut frames = Vec::new();
@@ -132,28 +134,14 @@ fn the_writer_writes_version_3_as_it_always_did() {
 #[test]
 fn the_reader_reads_version_3() {
     let log = std::fs::read(golden()).expect("the golden file");
-    let (mut reader, mut frames, mut records) = (Box::new(LogReader::new()), Vec::new(), 0);
-    let mut blocks = log.as_chunks::<SECTOR_BYTES>().0.iter();
-    let end = loop {
-        match blocks.next() {
-            Some(block) => reader.feed(block),
-            None => reader.end(),
+    let (mut frames, mut records) = (Vec::new(), 0);
+    let end = log::read(log.as_chunks::<SECTOR_BYTES>().0, |item| match item {
+        Item::Entry(Entry::Frame { at, bytes, verified }) => {
+            frames.push((at.as_millis(), bytes.to_vec(), verified));
         }
-        let mut end = None;
-        while let Some(item) = reader.next() {
-            match item {
-                Item::Frame { at, bytes, verified, .. } => {
-                    frames.push((at.as_millis(), bytes.to_vec(), verified));
-                }
-                Item::Record { .. } => records += 1,
-                Item::Gap(gap) => panic!("{gap:?}"),
-                Item::End(summary) => end = Some(summary),
-            }
-        }
-        if let Some(end) = end {
-            break end;
-        }
-    };
+        Item::Entry(Entry::Record { .. }) => records += 1,
+        Item::Gap(gap) => panic!("{gap:?}"),
+    });
     assert!(frames == stream());
     assert_eq!(records, 32);
     assert!(end.closed && end.groups >= 2, "{end:?}");

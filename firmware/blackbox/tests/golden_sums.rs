@@ -11,9 +11,11 @@ use std::path::Path;
 
 use card::Card;
 use frames::{Frame, checks, frame_len, frames_of};
-use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
+use hums_blackbox::{Entry as ReadEntry, Record, SECTOR_BYTES, Writer};
 use hums_core::clock::Instant;
 use kinds::{Entry, entries};
+
+use crate::log::{self, Item};
 
 fn write(batches: &[Vec<Entry>]) -> Vec<u8> {
     let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
@@ -38,28 +40,18 @@ fn write(batches: &[Vec<Entry>]) -> Vec<u8> {
 /// Times only advance for the writer.
 fn reads_back(log: &[u8], batches: &[Vec<Entry>]) {
     let (mut expected, mut latest) = (batches.iter().flatten(), 0);
-    let mut reader = Box::new(LogReader::new());
-    let mut blocks = log.as_chunks::<SECTOR_BYTES>().0.iter();
-    loop {
-        match blocks.next() {
-            Some(block) => reader.feed(block),
-            None => reader.end(),
+    let end = log::read(log.as_chunks::<SECTOR_BYTES>().0, |item| match (item, expected.next()) {
+        (Item::Entry(ReadEntry::Frame { at, bytes, verified }), Some(Entry::Frame(then, frame, fits))) => {
+            latest = latest.max(*then);
+            assert_eq!((at.as_millis(), bytes, verified), (latest, &frame[..], *fits));
         }
-        while let Some(item) = reader.next() {
-            match (item, expected.next()) {
-                (Item::Frame { at, bytes, verified, .. }, Some(Entry::Frame(then, frame, fits))) => {
-                    latest = latest.max(*then);
-                    assert_eq!((at.as_millis(), bytes, verified), (latest, &frame[..], *fits));
-                }
-                (Item::Record { at, record, .. }, Some(Entry::Record(then, stored))) => {
-                    latest = latest.max(*then);
-                    assert_eq!((at.as_millis(), record), (latest, Record::read(stored)));
-                }
-                (Item::End(summary), None) => return assert!(summary.closed, "{summary:?}"),
-                (item, entry) => panic!("{item:?} instead of {entry:?}"),
-            }
+        (Item::Entry(ReadEntry::Record { at, record }), Some(Entry::Record(then, stored))) => {
+            latest = latest.max(*then);
+            assert_eq!((at.as_millis(), record), (latest, Record::read(stored)));
         }
-    }
+        (item, entry) => panic!("{item:?} instead of {entry:?}"),
+    });
+    assert!(end.closed && expected.next().is_none(), "{end:?}");
 }
 
 /// CRC-32 as zlib computes it.

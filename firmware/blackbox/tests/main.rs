@@ -13,3 +13,5 @@ mod golden_sums;
 mod hostile;
 #[path = "common/kinds.rs"]
 mod kinds;
+#[path = "common/log.rs"]
+mod log;

@@ -1,6 +1,8 @@
 //! A board on the model of the chip, with the simulated SD card of `hums-sdcard` at its bus. All devices around it
 //! can fail (`docs/chip.md`).
 
+#[path = "../../../firmware/blackbox/tests/common/log.rs"]
+mod log;
 pub mod record;
 pub mod rig;
 pub mod usb;

@@ -2,11 +2,13 @@
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
+use hums_blackbox::Entry;
 use hums_blackbox::record::Record;
-use hums_blackbox::{Item, LogReader};
 use hums_recorder::BLOCK_BYTES;
 use hums_recorder::{Buffers, Card, CardStatus, LogName};
 use hums_sdcard::Medium;
+
+use super::log::{self, Item};
 
 /// A session on a card.
 #[derive(Debug, Default)]
@@ -45,8 +47,7 @@ fn some(medium: &Medium, skip: usize) -> Vec<Session> {
     let mut sessions = Vec::new();
     for mut names in names.into_values().skip(skip) {
         names.sort_unstable();
-        let mut reader = Box::new(LogReader::new());
-        let mut session = Session::default();
+        let mut blocks = Vec::new();
         for name in names {
             let Ok(mut segment) = card.segment(name) else { continue };
             // The newest copy of the last sector may be at the place after it.
@@ -60,36 +61,37 @@ fn some(medium: &Medium, skip: usize) -> Vec<Session> {
                 if empty > 1 {
                     break;
                 }
-                reader.feed(&block);
-                take(&mut reader, &mut session);
+                blocks.push(block);
             }
         }
-        reader.end();
-        take(&mut reader, &mut session);
+        let mut session = Session::default();
+        log::read(&blocks, |item| session.take(&item));
         sessions.push(session);
     }
     sessions
 }
 
-fn take(reader: &mut LogReader, session: &mut Session) {
-    while let Some(item) = reader.next() {
+impl Session {
+    fn take(&mut self, item: &Item<'_>) {
         match item {
-            Item::Frame { at, bytes, .. } => session.frames.push((at.as_millis(), bytes.to_vec())),
-            Item::Record { record: Record::Loss(loss), .. } => {
-                session.losses.push((
-                    loss.what.name(),
-                    loss.count,
-                    loss.from.as_millis(),
-                    loss.to.as_millis(),
-                ));
+            Item::Entry(Entry::Frame { at, bytes, .. }) => self.frames.push((at.as_millis(), bytes.to_vec())),
+            Item::Entry(Entry::Record { record, .. }) => self.record(record),
+            Item::Gap(_) => self.gaps += 1,
+        }
+    }
+
+    fn record(&mut self, record: &Record<'_>) {
+        match record {
+            Record::Loss(loss) => {
+                let (from, to) = (loss.from.as_millis(), loss.to.as_millis());
+                self.losses.push((loss.what.name(), loss.count, from, to));
             }
-            Item::Record { record: Record::Fault(fault), .. } => {
-                session.texts.push(format!("fault: {} in {} at {}", fault.message, fault.task, fault.place));
+            Record::Fault(fault) => {
+                self.texts.push(format!("fault: {} in {} at {}", fault.message, fault.task, fault.place));
             }
-            Item::Record { record: Record::Note(note), .. } => session.texts.push(note.text.to_owned()),
-            Item::Record { record: Record::Stats(stats), .. } => session.loads.push(stats.cpu_permille),
-            Item::Gap(_) => session.gaps += 1,
-            Item::Record { .. } | Item::End(_) => {}
+            Record::Note(note) => self.texts.push(note.text.to_owned()),
+            Record::Stats(stats) => self.loads.push(stats.cpu_permille),
+            _ => {}
         }
     }
 }

@@ -2,10 +2,13 @@
 //! urgent tasks run: frames and ticks of a service's time come before the next service.
 #![allow(dead_code, missing_docs, unreachable_pub)]
 
+#[path = "../../../../firmware/blackbox/tests/common/log.rs"]
+mod log;
+
 use std::collections::BTreeMap;
 
 use hums_blackbox::record::{Boot, MarkReason, Record};
-use hums_blackbox::{Gap, Item, LogReader, Writer};
+use hums_blackbox::{Entry, Gap, Writer};
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
 use hums_core::health::Level;
@@ -17,6 +20,7 @@ use hums_onboard::storage::{self, NO_CARD_RETRY};
 use hums_onboard::{Monitoring, PortStatus, ResetCause, Service, Supervisor, Task};
 use hums_recorder::{BLOCK_BYTES, Buffers, Card, CardState, CardStatus, LogName, Recorder, SpiCard};
 use hums_sdcard::{MS, Medium, Model, SimPort, Slot};
+use log::Item;
 
 /// 2.5 kB/s of log.
 const FRAME_EVERY: Span = Span::from_millis(40);
@@ -324,7 +328,7 @@ pub fn read(medium: &Medium) -> Found {
     for mut names in sessions.into_values() {
         names.sort_unstable();
         found.segments += names.len();
-        let mut reader = Box::new(LogReader::new());
+        let mut blocks = Vec::new();
         for name in names {
             let mut segment = card.segment(name).expect("it is there");
             // The newest copy of the last sector may be at the place after it.
@@ -336,34 +340,29 @@ pub fn read(medium: &Medium) -> Found {
                 if empty > 1 {
                     break;
                 }
-                reader.feed(&block);
-                take(&mut reader, &mut found);
+                blocks.push(block);
             }
         }
-        reader.end();
-        take(&mut reader, &mut found);
+        log::read(&blocks, |item| take(item, &mut found));
     }
     found
 }
 
-fn take(reader: &mut LogReader, found: &mut Found) {
-    while let Some(item) = reader.next() {
-        match item {
-            Item::Frame { bytes, .. } => {
-                found.all_frames += 1;
-                if let Some(frame) =
-                    Frame::again(bytes, Check::Unverified).filter(|frame| frame.id() == NOISE_ID)
-                {
-                    let payload = frame.payload();
-                    found.frames.push(u32::from_le_bytes([payload[0], payload[1], payload[2], payload[3]]));
-                }
+fn take(item: Item<'_>, found: &mut Found) {
+    match item {
+        Item::Entry(Entry::Frame { bytes, .. }) => {
+            found.all_frames += 1;
+            if let Some(frame) = Frame::again(bytes, Check::Unverified).filter(|frame| frame.id() == NOISE_ID)
+            {
+                let payload = frame.payload();
+                found.frames.push(u32::from_le_bytes([payload[0], payload[1], payload[2], payload[3]]));
             }
-            Item::Gap(gap) => found.gaps.push(gap),
-            Item::Record { record: Record::Event(event), .. } => {
-                found.events.push((event.number, event.text.to_owned()));
-            }
-            Item::Record { record: Record::Mark(mark), .. } => found.marks.push(mark.why),
-            Item::Record { .. } | Item::End(_) => {}
         }
+        Item::Gap(gap) => found.gaps.push(gap),
+        Item::Entry(Entry::Record { record: Record::Event(event), .. }) => {
+            found.events.push((event.number, event.text.to_owned()));
+        }
+        Item::Entry(Entry::Record { record: Record::Mark(mark), .. }) => found.marks.push(mark.why),
+        Item::Entry(Entry::Record { .. }) => {}
     }
 }
