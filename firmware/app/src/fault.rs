@@ -7,7 +7,7 @@
 
 use core::fmt::{self, Write as _};
 use core::panic::PanicInfo;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
 use cortex_m_rt::ExceptionFrame;
 use heapless::String;
@@ -21,41 +21,55 @@ use crate::registers::{Registers, stacked};
 const PLACE_BYTES: usize = 64;
 /// Bytes of the file's path within the place: the rest is for the line.
 const FILE_BYTES: usize = PLACE_BYTES - 8;
-const MESSAGE_BYTES: usize = 128;
 const SEEN: usize = 8;
 /// Bytes of [`Fault::last_messages`].
 const LAST_BYTES: usize = 200;
 const MARK: u32 = 0x4641_554C;
 
+/// What a note says happened, by its number.
 #[derive(Clone, Copy)]
-pub(crate) enum Kind {
-    Supply = 0,
-    Panic = 1,
-    HardFault = 2,
-    Watchdog = 3,
+pub(crate) enum Reason {
+    LowSupply,
+    Panic,
+    ProcessorFault,
+    StackOverflow,
+    /// A task that never returns.
+    Hanging,
+    /// A task that waits for ever.
+    Silent,
 }
+
+/// The kind of the record and its message, by the number of [`Reason`].
+const RECORDED: [(u8, &str); 6] = [
+    (0, "below 2.7 V"),
+    (1, "panic"),
+    (2, "processor fault"),
+    (2, "stack overflow"),
+    (WATCHDOG, "hangs"),
+    (WATCHDOG, "silent"),
+];
+const WATCHDOG: u8 = 3;
 
 struct Note {
     mark: AtomicU32,
     sum: AtomicU32,
-    kind: AtomicU32,
+    reason: AtomicU32,
     task: AtomicU32,
     at_ms: AtomicU32,
     registers: [AtomicU32; size_of::<Registers>() / 4],
-    place: Text<{ PLACE_BYTES / 4 }>,
-    message: Text<{ MESSAGE_BYTES / 4 }>,
+    /// Printable ASCII, ended by a zero or by its capacity.
+    place: [AtomicU8; PLACE_BYTES],
 }
 
 #[unsafe(link_section = ".uninit.fault")]
 static NOTE: Note = Note {
     mark: AtomicU32::new(0),
     sum: AtomicU32::new(0),
-    kind: AtomicU32::new(0),
+    reason: AtomicU32::new(0),
     task: AtomicU32::new(0),
     at_ms: AtomicU32::new(0),
     registers: [const { AtomicU32::new(0) }; size_of::<Registers>() / 4],
-    place: Text::new(),
-    message: Text::new(),
+    place: [const { AtomicU8::new(0) }; PLACE_BYTES],
 };
 
 /// The last messages of the autopilot: which, and when in milliseconds since the start.
@@ -91,7 +105,7 @@ pub(crate) struct Fault {
     task: &'static str,
     registers: Registers,
     place: String<PLACE_BYTES>,
-    message: String<MESSAGE_BYTES>,
+    message: &'static str,
     last_messages: String<LAST_BYTES>,
 }
 
@@ -109,11 +123,11 @@ impl Fault {
     /// Watchdog reset without a note: interrupts were off, or memory did not survive.
     pub(crate) fn without_note() -> Self {
         Self {
-            kind: Kind::Watchdog as u8,
+            kind: WATCHDOG,
             task: "?",
             registers: Registers::default(),
-            place: text("?"),
-            message: text("no note was left"),
+            place: "?".chars().collect(),
+            message: "no note was left",
             last_messages: String::new(),
         }
     }
@@ -124,12 +138,13 @@ pub(crate) fn take() -> Option<Fault> {
     if !noted || NOTE.sum.load(Ordering::Relaxed) != NOTE.sum_now() {
         return None;
     }
+    let (kind, message) = *RECORDED.get(NOTE.reason.load(Ordering::Relaxed) as usize)?;
     Some(Fault {
-        kind: NOTE.kind.load(Ordering::Relaxed) as u8,
+        kind,
         task: exceptions::task_of(NOTE.task.load(Ordering::Relaxed) as u16),
         registers: NOTE.registers.each_ref().map(|register| register.load(Ordering::Relaxed)),
-        place: NOTE.place.read(),
-        message: NOTE.message.read(),
+        place: NOTE.read_place(),
+        message,
         last_messages: LAST_SEEN.read(),
     })
 }
@@ -214,12 +229,11 @@ pub(crate) fn late(interrupted: &ExceptionFrame) {
     };
     if running == blamed {
         NOTE.keep_registers(stacked(interrupted));
-        let place = format_args!("pc {:08x}", interrupted.pc());
-        NOTE.keep(Kind::Watchdog, blamed, place, format_args!("hangs"));
+        NOTE.keep(Reason::Hanging, blamed, format_args!("pc {:08x}", interrupted.pc()));
     } else if !noted {
         // Otherwise an earlier check has found more.
         NOTE.keep_registers(Registers::default());
-        NOTE.keep(Kind::Watchdog, blamed, format_args!("waits"), format_args!("silent"));
+        NOTE.keep(Reason::Silent, blamed, format_args!("waits"));
     }
 }
 
@@ -231,15 +245,13 @@ pub(crate) fn not_late() {
 pub(crate) fn supply_low() {
     cortex_m::interrupt::disable();
     NOTE.keep_registers(Registers::default());
-    let (place, message) = (format_args!("supply"), format_args!("below 2.7 V"));
-    NOTE.keep(Kind::Supply, exceptions::begun(), place, message);
+    NOTE.keep(Reason::LowSupply, exceptions::begun(), format_args!("supply"));
 }
 
-/// The processor cannot go on. `overflow`: the stack was full, `place` is all that is known.
-pub(crate) fn processor(running: u16, registers: Registers, overflow: bool, place: fmt::Arguments) {
+/// The processor cannot go on.
+pub(crate) fn processor(reason: Reason, running: u16, registers: Registers, place: fmt::Arguments) {
     NOTE.keep_registers(registers);
-    let message = if overflow { "stack overflow" } else { "processor fault" };
-    NOTE.keep(Kind::HardFault, running, place, format_args!("{message}"));
+    NOTE.keep(reason, running, place);
 }
 
 /// The program cannot go on. The place shows the reason; the message would need the `Debug` of everything, 10 KiB of
@@ -252,15 +264,10 @@ pub(crate) fn panicked(registers: Registers, info: &PanicInfo) {
             // The end of a long path is more telling than its beginning.
             let file = place.file();
             let file = file.get(file.len().saturating_sub(FILE_BYTES)..).unwrap_or(file);
-            let place = format_args!("{file}:{}", place.line());
-            NOTE.keep(Kind::Panic, running, place, format_args!("panic"));
+            NOTE.keep(Reason::Panic, running, format_args!("{file}:{}", place.line()));
         }
-        None => NOTE.keep(Kind::Panic, running, format_args!("?"), format_args!("panic")),
+        None => NOTE.keep(Reason::Panic, running, format_args!("?")),
     }
-}
-
-fn text<const BYTES: usize>(text: &str) -> String<BYTES> {
-    String::try_from(text).unwrap_or_default()
 }
 
 impl Note {
@@ -271,64 +278,30 @@ impl Note {
         }
     }
 
-    fn keep(&self, kind: Kind, running: u16, place: fmt::Arguments, message: fmt::Arguments) {
-        self.kind.store(kind as u32, Ordering::Relaxed);
+    fn keep(&self, reason: Reason, running: u16, place: fmt::Arguments) {
+        self.reason.store(reason as u32, Ordering::Relaxed);
         self.task.store(u32::from(running), Ordering::Relaxed);
         self.at_ms.store(LAST_SEEN.now_ms.load(Ordering::Relaxed), Ordering::Relaxed);
-        self.place.write(place);
-        self.message.write(message);
+        let mut text = String::<PLACE_BYTES>::new();
+        let _ = text.write_fmt(place);
+        let ended = text.bytes().chain(core::iter::repeat(0));
+        for (kept, byte) in self.place.iter().zip(ended) {
+            kept.store(byte, Ordering::Relaxed);
+        }
         self.sum.store(self.sum_now(), Ordering::Relaxed);
         self.mark.store(MARK, Ordering::Relaxed);
     }
 
-    /// Any change of one word changes it; memory that was never written matches by a chance of 2^-32.
+    fn read_place(&self) -> String<PLACE_BYTES> {
+        let bytes = self.place.iter().map(|byte| byte.load(Ordering::Relaxed));
+        bytes.take_while(u8::is_ascii).map(char::from).take_while(|letter| *letter != '\0').collect()
+    }
+
+    /// Any change of one number or byte changes it; memory that was never written matches by a chance of 2^-32.
     fn sum_now(&self) -> u32 {
-        let words = [&self.kind, &self.task, &self.at_ms].into_iter().chain(&self.registers);
-        let words = words.chain(&self.place.0).chain(&self.message.0);
-        words.fold(MARK, |sum, word| {
-            sum.rotate_left(5) ^ word.load(Ordering::Relaxed).wrapping_mul(0x9E37_79B1)
-        })
-    }
-}
-
-/// Printable ASCII in words, ended by a zero or by its capacity.
-struct Text<const WORDS: usize>([AtomicU32; WORDS]);
-
-impl<const WORDS: usize> Text<WORDS> {
-    const fn new() -> Self {
-        Self([const { AtomicU32::new(0) }; WORDS])
-    }
-
-    fn write(&self, text: fmt::Arguments) {
-        for word in &self.0 {
-            word.store(0, Ordering::Relaxed);
-        }
-        // It never fails: a long text is cut.
-        let _ = TextWriter { words: &self.0, bytes: 0 }.write_fmt(text);
-    }
-
-    fn read<const BYTES: usize>(&self) -> String<BYTES> {
-        let bytes = self.0.iter().flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes());
-        let mut text = String::new();
-        for byte in bytes.take_while(|byte| *byte != 0) {
-            let _ = text.push(if (b' '..=b'~').contains(&byte) { char::from(byte) } else { '?' });
-        }
-        text
-    }
-}
-
-struct TextWriter<'a> {
-    words: &'a [AtomicU32],
-    bytes: usize,
-}
-
-impl fmt::Write for TextWriter<'_> {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        for byte in text.bytes() {
-            let Some(word) = self.words.get(self.bytes / 4) else { return Ok(()) };
-            word.fetch_or(u32::from(byte) << (8 * (self.bytes % 4)), Ordering::Relaxed);
-            self.bytes += 1;
-        }
-        Ok(())
+        let words = [&self.reason, &self.task, &self.at_ms].into_iter().chain(&self.registers);
+        let words = words.map(|word| word.load(Ordering::Relaxed));
+        let bytes = self.place.iter().map(|byte| u32::from(byte.load(Ordering::Relaxed)));
+        words.chain(bytes).fold(MARK, |sum, word| sum.rotate_left(5) ^ word.wrapping_mul(0x9E37_79B1))
     }
 }

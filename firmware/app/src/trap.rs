@@ -12,6 +12,7 @@ use core::panic::PanicInfo;
 use cortex_m_rt::ExceptionFrame;
 
 use crate::boards::board;
+use crate::fault::Reason;
 use crate::registers::{self, Registers, stacked};
 use crate::{exceptions, fault, memory};
 
@@ -50,16 +51,22 @@ extern "C" fn caught(stack: usize) -> ! {
         registers[8..].copy_from_slice(&status);
         let near = return_address();
         registers[5] = near;
-        give_up(exceptions::begun(), registers, true, format_args!("called from {near:08x}"));
+        give_up(
+            Reason::StackOverflow,
+            exceptions::begun(),
+            registers,
+            format_args!("called from {near:08x}"),
+        );
     }
     if stack + size_of::<ExceptionFrame>() > top {
-        give_up(exceptions::begun(), Registers::default(), false, format_args!("stack {stack:08x}"));
+        let place = format_args!("stack {stack:08x}");
+        give_up(Reason::ProcessorFault, exceptions::begun(), Registers::default(), place);
     }
     // SAFETY: the processor stacked its registers there, in memory that is the stack's by the checks above.
     let frame = unsafe { &*core::ptr::with_exposed_provenance::<ExceptionFrame>(stack) };
     // The stacked status has the interrupted exception.
     let running = (frame.xpsr() & 0x1FF) as u16;
-    give_up(running, stacked(frame), false, format_args!("pc {:08x}", frame.pc()));
+    give_up(Reason::ProcessorFault, running, stacked(frame), format_args!("pc {:08x}", frame.pc()));
 }
 
 /// The innermost return address on a full stack in our code; 0 if there is none.
@@ -69,9 +76,8 @@ fn return_address() -> u32 {
     memory::stack_words().take(SEARCHED_WORDS).find(is_return).map_or(0, |word| word & !1)
 }
 
-/// `overflow`: the stack was full and only `place` is known.
-fn give_up(running: u16, registers: Registers, overflow: bool, place: fmt::Arguments) -> ! {
-    fault::processor(running, registers, overflow, place);
+fn give_up(reason: Reason, running: u16, registers: Registers, place: fmt::Arguments) -> ! {
+    fault::processor(reason, running, registers, place);
     board::restart();
 }
 
