@@ -1,4 +1,5 @@
-//! The card answers nothing for 2.5 s while a line at 921,600 baud delivers frames back to back.
+//! The card answers nothing for 2.5 s while a line at 921,600 baud delivers frames back to back: the repository's recordings, and
+//! those below `HUMS_FLIGHTS`.
 
 use anyhow::{Context as _, Result, ensure};
 use hums::card::Faults;
@@ -12,7 +13,7 @@ use super::card::Card;
 use super::figures::{Figures, Labels};
 use super::options::Options;
 use super::stream::{FULL_RATE, Stream};
-use crate::flights::{OWN, own};
+use crate::flights::{OWN, more, own};
 
 /// Seconds: the first for the short form, all for the long one.
 const STALLS_AT_S: [u64; 7] = [5, 2, 3, 4, 6, 7, 8];
@@ -26,7 +27,7 @@ pub(super) const LABELS: Labels = Labels {
 };
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
-    let paths: Vec<_> = OWN.into_iter().map(own).collect();
+    let paths: Vec<_> = OWN.into_iter().map(own).chain(more()).collect();
     let moments = if options.short { &STALLS_AT_S[..1] } else { &STALLS_AT_S };
     let outcomes = paths.par_iter().with_max_len(1).map(|path| {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
