@@ -1,8 +1,7 @@
 //! The codec, from outside: any input of a link comes back bit for bit, with its times.
 
-use crate::card;
-use crate::common;
-use crate::frames;
+use crate::log::{self, Item};
+use crate::{card, common, container, frames};
 
 use card::Card;
 use common::Random;
@@ -14,19 +13,10 @@ use hums_blackbox::{
 use hums_core::clock::Instant;
 use proptest::prelude::*;
 
-use crate::log::{self, Item};
-
 fn read(sectors: &[Sector]) -> (Vec<Frame>, Vec<String>) {
-    let (mut frames, mut notes) = (Vec::new(), Vec::new());
-    log::read(sectors.iter().map(Sector::bytes), |item| match item {
-        Item::Entry(Entry::Frame { at, bytes, verified }) => {
-            frames.push((at.as_millis(), bytes.to_vec(), verified));
-        }
-        Item::Entry(Entry::Record { record: Record::Note(note), .. }) => notes.push(note.text.to_owned()),
-        Item::Entry(Entry::Record { .. }) => {}
-        Item::Gap(gap) => panic!("{gap:?}"),
-    });
-    (frames, notes)
+    let log = container::read(sectors.iter().map(Sector::bytes));
+    assert_eq!(log.gaps, []);
+    (log.frames, log.notes)
 }
 
 fn round_trip(frames: &[Frame]) -> usize {

@@ -67,21 +67,26 @@ fn write(frames: &[Frame], finish: bool) -> Vec<Sector> {
 }
 
 #[derive(Default)]
-struct Log {
-    frames: Vec<Frame>,
-    gaps: Vec<hums_blackbox::Gap>,
-    notes: Vec<String>,
-    end: End,
+pub(crate) struct Log {
+    pub(crate) frames: Vec<Frame>,
+    pub(crate) gaps: Vec<hums_blackbox::Gap>,
+    pub(crate) records: usize,
+    pub(crate) notes: Vec<String>,
+    pub(crate) end: End,
 }
 
-fn read<'a>(blocks: impl IntoIterator<Item = &'a [u8; 512]>) -> Log {
+pub(crate) fn read<'a>(blocks: impl IntoIterator<Item = &'a [u8; 512]>) -> Log {
     let mut log = Log::default();
     log.end = log::read(blocks, |item| match item {
         Item::Entry(Entry::Frame { at, bytes, verified }) => {
             log.frames.push((at.as_millis(), bytes.to_vec(), verified));
         }
-        Item::Entry(Entry::Record { record: Record::Note(note), .. }) => log.notes.push(note.text.to_owned()),
-        Item::Entry(Entry::Record { .. }) => {}
+        Item::Entry(Entry::Record { record, .. }) => {
+            log.records += 1;
+            if let Record::Note(note) = record {
+                log.notes.push(note.text.to_owned());
+            }
+        }
         Item::Gap(gap) => log.gaps.push(gap),
     });
     log

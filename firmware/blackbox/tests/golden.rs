@@ -3,17 +3,15 @@
 //! `mixed-3.log` holds frames and records made by `stream` below, in several groups. To write it anew (only before
 //! the version is published): `HUMS_GOLDEN=write cargo test -p hums-blackbox golden::`.
 
-use crate::card;
+use crate::{card, container};
 
 use std::path::PathBuf;
 
 use card::Card;
 use hums_blackbox::record::{Boot, Clock, Moment, Note, Stats, Usage};
-use hums_blackbox::{Entry, Record, SECTOR_BYTES, Writer};
+use hums_blackbox::{Record, SECTOR_BYTES, Writer};
 use hums_core::clock::Instant;
 use hums_dialect::crc;
-
-use crate::log::{self, Item};
 
 fn stream() -> Vec<(u64, Vec<u8>, bool)> {
     let mut frames = Vec::new();
@@ -134,15 +132,8 @@ fn the_writer_writes_version_3_as_it_always_did() {
 #[test]
 fn the_reader_reads_version_3() {
     let log = std::fs::read(golden()).expect("the golden file");
-    let (mut frames, mut records) = (Vec::new(), 0);
-    let end = log::read(log.as_chunks::<SECTOR_BYTES>().0, |item| match item {
-        Item::Entry(Entry::Frame { at, bytes, verified }) => {
-            frames.push((at.as_millis(), bytes.to_vec(), verified));
-        }
-        Item::Entry(Entry::Record { .. }) => records += 1,
-        Item::Gap(gap) => panic!("{gap:?}"),
-    });
-    assert!(frames == stream());
-    assert_eq!(records, 32);
-    assert!(end.closed && end.groups >= 2, "{end:?}");
+    let log = container::read(log.as_chunks::<SECTOR_BYTES>().0);
+    assert!(log.frames == stream() && log.gaps.is_empty());
+    assert_eq!(log.records, 32);
+    assert!(log.end.closed && log.end.groups >= 2, "{:?}", log.end);
 }

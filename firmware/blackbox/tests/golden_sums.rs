@@ -3,9 +3,8 @@
 //! model would still read back its own output: only fixed bytes show the change. A group names the table of layouts:
 //! a new dialect (`layouts`) makes new sums, a new version of the format adds its own.
 
-use crate::card;
-use crate::frames;
-use crate::kinds;
+use crate::log::{self, Item};
+use crate::{card, frames, kinds};
 
 use std::path::Path;
 
@@ -14,8 +13,6 @@ use frames::{Frame, checks, frame_len, frames_of};
 use hums_blackbox::{Entry as ReadEntry, Record, SECTOR_BYTES, Writer};
 use hums_core::clock::Instant;
 use kinds::{Entry, entries};
-
-use crate::log::{self, Item};
 
 fn write(batches: &[Vec<Entry>]) -> Vec<u8> {
     let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "not each of its users needs all of it")]
 
 use hums_blackbox::{
-    Assembler, BlockCounts, Cause, Entry, Gap, GroupDecoder, Header, Preamble, Record, SECTOR_BYTES, Step,
+    Assembler, BlockCounts, Cause, Entry, Gap, GroupDecoder, Preamble, Record, SECTOR_BYTES, Step,
 };
 use hums_core::clock::Instant;
 
@@ -37,15 +37,14 @@ pub(crate) fn read<'a>(
         frames: None,
         end: End::default(),
     };
-    for block in blocks {
-        assembler.feed(block);
+    for block in blocks.into_iter().map(Some).chain([None]) {
+        match block {
+            Some(block) => assembler.feed(block),
+            None => assembler.end(),
+        }
         while let Some(step) = assembler.next() {
             reading.step(&step);
         }
-    }
-    assembler.end();
-    while let Some(step) = assembler.next() {
-        reading.step(&step);
     }
     // The last sector may be partial, and a damaged block the whole one.
     let damaged = assembler.damaged_since() + reading.cut.unwrap_or(0);
@@ -96,15 +95,13 @@ impl<F: FnMut(Item<'_>)> Reading<F> {
         match self.decoder.push(header, &step.sector) {
             Ok(()) if header.starts_group() => self.begin(self.decoder.preamble()),
             Ok(()) => {}
-            Err(error) => self.skip(header, error.into()),
+            Err(error) => {
+                let gap = self.open(error.into());
+                gap.sectors_skipped += 1;
+                gap.frames = Some(gap.frames.unwrap_or(0).saturating_add(u32::from(header.frames)));
+            }
         }
         self.entries();
-    }
-
-    fn skip(&mut self, header: &Header, cause: Cause) {
-        let gap = self.open(cause);
-        gap.sectors_skipped += 1;
-        gap.frames = Some(gap.frames.unwrap_or(0).saturating_add(u32::from(header.frames)));
     }
 
     fn begin(&mut self, preamble: Preamble) {
@@ -132,17 +129,14 @@ impl<F: FnMut(Item<'_>)> Reading<F> {
                 }
             };
             match entry {
-                Entry::Frame { at, .. } => {
-                    self.last_at = Some(at);
-                    self.frames = self.frames.map(|frames| frames.wrapping_add(1));
+                Entry::Frame { .. } => self.frames = self.frames.map(|frames| frames.wrapping_add(1)),
+                Entry::Record { record: Record::Clock(clock), .. } => {
+                    self.end.epoch_micros = Some(clock.epoch_micros());
                 }
-                Entry::Record { at, record } => {
-                    self.last_at = Some(at);
-                    if let Record::Clock(clock) = record {
-                        self.end.epoch_micros = Some(clock.epoch_micros());
-                    }
-                }
+                Entry::Record { .. } => {}
             }
+            let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = entry;
+            self.last_at = Some(at);
             (self.take)(Item::Entry(entry));
         }
     }
