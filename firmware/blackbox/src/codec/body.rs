@@ -133,7 +133,7 @@ impl Body {
 
     /// Assembles the last payload from the elements; `None` unless all of it was stored.
     pub(super) fn restore(&self, slot: &Slot, frame: &mut Frame) -> Option<()> {
-        let (mut end, mut is_kept) = (0, slot.has_layout);
+        let (mut end, mut is_kept) = (0, slot.has_layout());
         let mut rest = self.elements.list.get(elements_in(slot))?;
         while let Some((element, after)) = rest.split_first()
             && usize::from(element.end) <= limit(slot)

@@ -186,7 +186,7 @@ fn spelled_out<C: Coder>(coder: &mut C, slot: &mut Slot, frame: &mut Frame, veri
     frame.compat = coder.bits16(u32::from(frame.compat), 8) as u8;
     slot.verified = coder.bits16(u32::from(verified), 1) != 0;
     frame.len = coder.bits16(frame.len as u32, 8) as usize;
-    let trims = slot.has_layout && frame.len <= usize::from(slot.described) && frame.is_trimmed();
+    let trims = slot.has_layout() && frame.len <= usize::from(slot.described) && frame.is_trimmed();
     let trims = coder.bits16(u32::from(slot.key.v2 && trims), 1) != 0;
     slot.length = if trims { Length::Trimmed } else { Length::Fixed(frame.len as u8) };
     plan.length = Some(frame.len);

@@ -37,7 +37,6 @@ pub(crate) enum Length {
 #[derive(Clone, Copy, FromZeros)]
 pub(crate) struct Slot {
     pub(crate) key: Key,
-    pub(crate) has_layout: bool,
     pub(crate) elements: u16,
     pub(crate) elements_count: u8,
     /// The distribution of the times before its frames; 0: none yet.
@@ -72,7 +71,6 @@ impl Slot {
         let len_base = message.map_or(0, |message| message.len_base);
         Self {
             key,
-            has_layout,
             elements,
             described: described as u8,
             seed: message.map_or(0, |message| message.crc_extra),
@@ -87,6 +85,10 @@ impl Slot {
 }
 
 impl Slot {
+    pub(crate) const fn has_layout(&self) -> bool {
+        self.described > 0
+    }
+
     fn is_instance(&self, frame: &Frame) -> bool {
         let (at, size) = (usize::from(self.instance_at), usize::from(self.instance_size));
         self.key.instance.get(..size) == frame.payload.get(at..at + size)
