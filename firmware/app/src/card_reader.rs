@@ -36,7 +36,7 @@ const HOST_MAX: Span = Span::from_secs(600);
 const PARTING: Span = Span::from_secs(1);
 /// `SysTick` feeds the watchdog for this many turns without the loop: 10 s, of which the card's driver has 8.
 const LOOP_TURNS_MAX: u32 = 100;
-/// How often the autopilot's port is looked at: its ring holds 11 ms. After a longer identification of a card its bytes are lost.
+/// How often the autopilot's port is looked at: its ring holds 22 ms. After a longer identification of a card its bytes are lost.
 const LISTEN_EVERY: Span = Span::from_millis(1);
 /// How often the bus is looked at and the LED's pin is set: a pin of the debug port is not the LED's at first.
 const LOOK_EVERY: Span = Span::from_millis(100);

@@ -6,8 +6,8 @@
 //! | 0 | the watch (`watch`) and the supply's | say what hangs, and that power goes |
 //! | 1 | the port's interrupts | moves bytes, microseconds |
 //! | 2 | the clock's interrupt | wakes tasks |
-//! | 3 | reception | the ring holds 11 ms |
-//! | 5 | monitor | the frame queue holds 12 ms |
+//! | 3 | reception | the ring holds 22 ms |
+//! | 5 | monitor | the frame queue holds 14 ms |
 //! | 7 | downlink | an alert has 50 ms; with it requests, uplink and USB with its interrupt, which only move bytes between ports and queues |
 //! | 9 | storage | the sector queue holds 2.5 s; its library waits for the card with the processor |
 

@@ -39,15 +39,29 @@ pub(crate) enum Reason {
     Silent,
 }
 
-/// The kind of the record and its message, by the number of [`Reason`].
-const RECORDED: [(u8, &str); 6] = [
-    (0, "below 2.7 V"),
-    (1, "panic"),
-    (2, "processor fault"),
-    (2, "stack overflow"),
-    (WATCHDOG, "hangs"),
-    (WATCHDOG, "silent"),
-];
+impl Reason {
+    const ALL: [Self; 6] = [
+        Self::LowSupply,
+        Self::Panic,
+        Self::ProcessorFault,
+        Self::StackOverflow,
+        Self::Hanging,
+        Self::Silent,
+    ];
+
+    /// The kind of the record and its message.
+    const fn recorded(self) -> (u8, &'static str) {
+        match self {
+            Self::LowSupply => (0, "below 2.7 V"),
+            Self::Panic => (1, "panic"),
+            Self::ProcessorFault => (2, "processor fault"),
+            Self::StackOverflow => (2, "stack overflow"),
+            Self::Hanging => (WATCHDOG, "hangs"),
+            Self::Silent => (WATCHDOG, "silent"),
+        }
+    }
+}
+
 const WATCHDOG: u8 = 3;
 
 struct Note {
@@ -57,7 +71,7 @@ struct Note {
     task: AtomicU32,
     at_ms: AtomicU32,
     registers: [AtomicU32; size_of::<Registers>() / 4],
-    /// Printable ASCII, ended by a zero or by its capacity.
+    /// ASCII, ended by a zero or by its capacity.
     place: [AtomicU8; PLACE_BYTES],
 }
 
@@ -138,7 +152,7 @@ pub(crate) fn take() -> Option<Fault> {
     if !noted || NOTE.sum.load(Ordering::Relaxed) != NOTE.sum_now() {
         return None;
     }
-    let (kind, message) = *RECORDED.get(NOTE.reason.load(Ordering::Relaxed) as usize)?;
+    let (kind, message) = Reason::ALL.get(NOTE.reason.load(Ordering::Relaxed) as usize)?.recorded();
     Some(Fault {
         kind,
         task: exceptions::task_of(NOTE.task.load(Ordering::Relaxed) as u16),
@@ -283,6 +297,7 @@ impl Note {
         self.task.store(u32::from(running), Ordering::Relaxed);
         self.at_ms.store(LAST_SEEN.now_ms.load(Ordering::Relaxed), Ordering::Relaxed);
         let mut text = String::<PLACE_BYTES>::new();
+        // A file's path and a line fit.
         let _ = text.write_fmt(place);
         let ended = text.bytes().chain(core::iter::repeat(0));
         for (kept, byte) in self.place.iter().zip(ended) {

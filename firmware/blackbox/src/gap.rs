@@ -17,7 +17,7 @@ pub enum Cause {
     Corrupt,
     /// Valid sectors with altered entries: the recorder's memory had changed.
     Altered,
-    /// The vehicle was disarmed and is recorded by arming: sectors were dropped on purpose, by a record.
+    /// Nothing was written while the vehicle was disarmed: of other recorders.
     Disarmed,
 }
 

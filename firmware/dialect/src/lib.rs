@@ -186,7 +186,7 @@ mod tests {
     fn every_layout_adds_up() {
         for message in messages() {
             let total: usize = message.fields.iter().map(Field::size).sum();
-            assert_eq!(total, message.len_max as usize, "message id {}", message.id);
+            assert!(total > 0 && total == message.len_max as usize, "message id {}", message.id);
         }
     }
 

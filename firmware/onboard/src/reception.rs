@@ -1,6 +1,6 @@
 //! The reception task's body: bytes in, frames with their times into the frame queue.
 //!
-//! The most urgent task: the port's ring holds 11 ms at 921,600 baud. It only finds frames, about ten instructions a
+//! The most urgent task: the port's ring holds 22 ms at 921,600 baud. It only finds frames, about ten instructions a
 //! byte, and never waits.
 
 use hums_core::clock::{Instant, Span};

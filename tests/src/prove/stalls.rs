@@ -1,5 +1,5 @@
 //! The card answers nothing for 2.5 s while a line at 921,600 baud delivers frames back to back: the repository's recordings, and
-//! those below `HUMS_FLIGHTS`.
+//! in the long form those below `HUMS_FLIGHTS`.
 
 use anyhow::{Context as _, Result, ensure};
 use hums::card::Faults;
@@ -27,7 +27,8 @@ pub(super) const LABELS: Labels = Labels {
 };
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
-    let paths: Vec<_> = OWN.into_iter().map(own).chain(more()).collect();
+    let further = if options.short { Vec::new() } else { more() };
+    let paths: Vec<_> = OWN.into_iter().map(own).chain(further).collect();
     let moments = if options.short { &STALLS_AT_S[..1] } else { &STALLS_AT_S };
     let outcomes = paths.par_iter().with_max_len(1).map(|path| {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -40,6 +41,10 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
         Ok((name, stream, worst.context("no stall")?))
     });
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
+    let is_lossy = |(_, stream, stats): &&(String, Stream, Stats)| !stream.is_signed && stats.frames_lost > 0;
+    let lossy: Vec<_> =
+        outcomes.iter().filter(is_lossy).map(|(name, _, stats)| (name, stats.frames_lost)).collect();
+    ensure!(lossy.is_empty(), "frames lost of {} of {} recordings: {lossy:?}", lossy.len(), outcomes.len());
     let mut figures = Figures::new(&LABELS);
     let unsigned: Vec<_> = outcomes.iter().filter(|(_, stream, _)| !stream.is_signed).collect();
     figures.fact("unsigned recordings", unsigned.len());
@@ -65,7 +70,7 @@ fn seconds_of(moments: &[u64]) -> String {
     moments.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// The card stalls once; an unsigned frame must not be lost.
+/// The card stalls once.
 fn stall(stream: &Stream, at_s: u64) -> Result<Stats> {
     let stall = Stall { from_us: at_s * 1_000_000, for_us: STALL_MS * 1_000 };
     let card = Card::new(256)?;
@@ -74,12 +79,6 @@ fn stall(stream: &Stream, at_s: u64) -> Result<Stats> {
     let stats = done.stats;
     // The write begins a little before it.
     ensure!(stats.sd_stall_ms_max >= STALL_MS - 250, "the card never stood still");
-    ensure!(
-        stream.is_signed || stats.frames_lost + done.frames_left == 0,
-        "{} frames lost, queue {} of {} bytes",
-        stats.frames_lost,
-        stats.queue_bytes_max,
-        stats.queue_bytes_capacity
-    );
+    ensure!(done.frames_left == 0, "{} frames are left", done.frames_left);
     Ok(stats)
 }

@@ -85,6 +85,7 @@ impl Slot {
 }
 
 impl Slot {
+    /// Each message has a field.
     pub(crate) const fn has_layout(&self) -> bool {
         self.described > 0
     }

@@ -13,7 +13,7 @@
 //! # What a save costs
 //! A word of the STM32F405's flash takes 16 µs to write and 100 µs at most (datasheet, table 40). In that time the
 //! processor gets no instruction out of the flash; between two words more urgent tasks run. So a save of the
-//! session's counters, 43 words, delays a task by at most 0.1 ms, and the autopilot port's ring holds 11 ms.
+//! session's counters, 43 words, delays a task by at most 0.1 ms, and the autopilot port's ring holds 22 ms.
 //!
 //! An erase takes 0.25 s, 0.5 s at the longest (datasheet, table 40, 16 KiB, words of 32 bits). There are three times
 //! for it:

@@ -5,9 +5,9 @@ use hums_link::encode::FRAME_BYTES_MAX;
 use hums_link::{outlet, summary};
 use hums_recorder::recorder::ROW_BLOCKS;
 
-/// 12 ms of a line at 921,600 baud, stamps included. The monitor's longest step, a tick that records everything there
-/// is, takes 4 ms.
-pub const FRAME_QUEUE_BYTES: usize = 1536;
+/// 14 ms of a line at 921,600 baud in frames of 40 bytes, with their stamps, and an end too short for the longest frame. The monitor's
+/// longest step, a tick that records everything there is, takes 4 ms.
+pub const FRAME_QUEUE_BYTES: usize = 2 * 1024;
 
 /// The waiting frames of the port's outlet, with findings; the frame being sent; and an end of the queue too short
 /// for the longest frame.
@@ -23,8 +23,8 @@ pub const UPLINK_QUEUE_BYTES: usize = 1024;
 /// A round of requests to the autopilot (9 commands of 45 bytes, signed 58), two frames that pass through, and the frame being sent.
 pub const AUTOPILOT_QUEUE_BYTES: usize = 1100 + FRAME_BYTES_MAX;
 
-/// 2.5 s of a stalled card at 921,600 baud: 92 kB/s, compressed 3 times.
-const STALL_SECTORS: usize = 150;
+/// 2.5 s of a stalled card at 921,600 baud: 92 kB/s, compressed 3.03 times.
+pub(super) const STALL_SECTORS: usize = (92_160 * 5 / 2 * 100 / 303_usize).div_ceil(SECTOR_BYTES);
 
 /// A stall, with the reserve, the room that the writer asks for, and the row that the card is taking.
 pub const SECTOR_QUEUE_SECTORS: usize = STALL_SECTORS + SECTOR_RESERVE + ENTRY_SECTORS_MAX + ROW_BLOCKS;

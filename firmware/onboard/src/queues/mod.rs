@@ -214,8 +214,7 @@ mod tests {
 
     #[test]
     fn while_the_card_takes_a_row_there_is_room_for_a_stall_of_2_5_s() {
-        // 921,600 baud, compressed 3 times.
-        let sectors = (92_160 * 5 / 2 / 3_usize).div_ceil(SECTOR_BYTES);
+        let sectors = capacities::STALL_SECTORS;
         let mut queues = Box::new(Queues::new());
         let (MonitorEnds { sectors: mut sectors_in, .. }, Ends { mut sectors_out, .. }) = queues.split();
         let sector = Sector::zeroed();

@@ -343,12 +343,12 @@ pub fn read(medium: &Medium) -> Found {
                 blocks.push(block);
             }
         }
-        log::read(&blocks, |item| take(item, &mut found));
+        log::read(&blocks, |item| take(&item, &mut found));
     }
     found
 }
 
-fn take(item: Item<'_>, found: &mut Found) {
+fn take(item: &Item<'_>, found: &mut Found) {
     match item {
         Item::Entry(Entry::Frame { bytes, .. }) => {
             found.all_frames += 1;
@@ -358,7 +358,7 @@ fn take(item: Item<'_>, found: &mut Found) {
                 found.frames.push(u32::from_le_bytes([payload[0], payload[1], payload[2], payload[3]]));
             }
         }
-        Item::Gap(gap) => found.gaps.push(gap),
+        Item::Gap(gap) => found.gaps.push(*gap),
         Item::Entry(Entry::Record { record: Record::Event(event), .. }) => {
             found.events.push((event.number, event.text.to_owned()));
         }

@@ -37,8 +37,8 @@ use defmt_rtt as _;
 pub(crate) const AUTOPILOT_BAUD: u32 = 921_600;
 /// Baud rate of the ground station's port: the radios' usual one.
 pub(crate) const GS_BAUD: u32 = 57_600;
-/// 11 ms at 921,600 baud. Reception runs every millisecond, so it may be delayed by 10 of its periods.
-pub(crate) const RING_BYTES: usize = 1_024;
+/// 22 ms at 921,600 baud. Reception runs every millisecond, so it may be delayed by 20 of its periods.
+pub(crate) const RING_BYTES: usize = 2_048;
 /// Period of reception, which is the resolution of arrival times in the log.
 pub(crate) const FETCH_EVERY: Duration = Duration::from_millis(1);
 /// Turns of `SysTick` without the watchdog being fed after which it counts as late: 0.6 s, as the watchdog's own clock may
