@@ -125,7 +125,7 @@ impl Queues {
 #[cfg(test)]
 mod tests {
     use super::frames::STAMP_BYTES;
-    use hums_blackbox::{ENTRY_SECTORS_MAX, SECTOR_BYTES, Sector, SectorSink as _};
+    use hums_blackbox::{ENTRY_SECTORS_MAX, Sector, SectorSink as _};
     use hums_link::encode::Encoder;
     use hums_link::frame::Frame;
     use hums_link::packet::Packet;
