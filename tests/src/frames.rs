@@ -39,12 +39,15 @@ fn header(data: &[u8]) -> Option<(usize, u32)> {
     (length <= data.len()).then_some((length, id))
 }
 
-/// X.25, bit by bit.
+/// X.25, a byte a step.
 pub fn checksum(covered: &[u8], seed: u8) -> u16 {
-    covered.iter().chain([&seed]).fold(0xFFFF, |crc, byte| {
-        (0..8)
-            .fold(crc ^ u16::from(*byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0x8408 } else { crc >> 1 })
-    })
+    let mut crc = 0xFFFF_u16;
+    for byte in covered.iter().chain([&seed]) {
+        let mixed = byte ^ crc as u8;
+        let mixed = u16::from(mixed ^ mixed << 4);
+        crc = crc >> 8 ^ mixed << 8 ^ mixed << 3 ^ mixed >> 4;
+    }
+    crc
 }
 
 fn verified(frame: &[u8], id: u32, seeds: &Seeds) -> bool {
@@ -91,11 +94,16 @@ pub fn of_raw<'a>(data: &'a [u8], seeds: &Seeds) -> Vec<Frame<'a>> {
     frames
 }
 
-/// A v2 frame with `seed`'s checksum.
+/// A v2 frame of an autopilot, with `seed`'s checksum.
 pub fn build_v2(sequence: u8, id: u32, payload: &[u8], seed: u8) -> Vec<u8> {
+    build_from((1, 1), sequence, id, payload, seed)
+}
+
+/// As [`build_v2`], of this system and component.
+pub fn build_from((system, component): (u8, u8), sequence: u8, id: u32, payload: &[u8], seed: u8) -> Vec<u8> {
     let [low, middle, high, _] = id.to_le_bytes();
     let length = u8::try_from(payload.len()).unwrap();
-    let mut frame = vec![STX_V2, length, 0, 0, sequence, 1, 1, low, middle, high];
+    let mut frame = vec![STX_V2, length, 0, 0, sequence, system, component, low, middle, high];
     frame.extend_from_slice(payload);
     let checksum = checksum(&frame[1..], seed);
     frame.extend_from_slice(&checksum.to_le_bytes());

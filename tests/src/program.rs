@@ -87,6 +87,17 @@ pub fn hums<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Outcome 
     child::run(&mut command(arguments), LIMIT)
 }
 
+/// Runs `hums` with these words; each `{}` is the next one of these paths.
+#[track_caller]
+pub fn hums_with(words: &str, paths: &[&dyn AsRef<OsStr>]) -> Outcome {
+    let mut paths = paths.iter();
+    let word = |word| match word {
+        "{}" => (*paths.next().expect("a path for each {}")).as_ref(),
+        word => OsStr::new(word),
+    };
+    hums(words.split(' ').map(word))
+}
+
 /// The machine that runs the pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Machine {

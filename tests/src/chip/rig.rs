@@ -9,6 +9,7 @@ use stm32f405_model::time::{MS, Ps, SECOND};
 
 use super::record::{Compared, Session, compare, read};
 use super::{BAUD, board_with, pin, usart, wired};
+use crate::frames;
 
 /// Frames and the image that records them.
 #[derive(Debug)]
@@ -167,17 +168,7 @@ impl Rig {
 
 /// A `MAVLink` 2 frame of a ground station.
 pub fn frame(id: u32, payload: &[u8], seed: u8, sequence: u8) -> Vec<u8> {
-    let mut frame = vec![0xFD, payload.len() as u8, 0, 0, sequence, 255, 190];
-    frame.extend(&id.to_le_bytes()[..3]);
-    frame.extend(payload);
-    let mut crc = 0xFFFF_u16;
-    for byte in frame[1..].iter().chain([&seed]) {
-        let mixed = byte ^ crc as u8;
-        let mixed = u16::from(mixed ^ mixed << 4);
-        crc = crc >> 8 ^ mixed << 8 ^ mixed << 3 ^ mixed >> 4;
-    }
-    frame.extend(crc.to_le_bytes());
-    frame
+    frames::build_from((255, 190), sequence, id, payload, seed)
 }
 
 /// `PARAM_SET`.
@@ -196,18 +187,5 @@ pub fn heartbeat(sequence: u8) -> Vec<u8> {
 
 /// A heartbeat with this `base_mode`.
 pub fn heartbeat_in(base_mode: u8, sequence: u8) -> Vec<u8> {
-    let mut frame = frame(0, &[0, 0, 0, 0, 2, 3, base_mode, 3, 3], 50, sequence);
-    // From the autopilot's own component.
-    frame[5] = 1;
-    frame[6] = 1;
-    let body = frame[..frame.len() - 2].to_vec();
-    let mut crc = 0xFFFF_u16;
-    for byte in body[1..].iter().chain([&50]) {
-        let mixed = byte ^ crc as u8;
-        let mixed = u16::from(mixed ^ mixed << 4);
-        crc = crc >> 8 ^ mixed << 8 ^ mixed << 3 ^ mixed >> 4;
-    }
-    let end = frame.len() - 2;
-    frame[end..].copy_from_slice(&crc.to_le_bytes());
-    frame
+    frames::build_v2(sequence, 0, &[0, 0, 0, 0, 2, 3, base_mode, 3, 3], 50)
 }
