@@ -114,13 +114,13 @@ fn flip(
 
 #[test]
 fn flips_in_the_codecs_memory_give_no_wrong_frame() {
-    let Outcome { compared, read, resets, stopped, .. } = flipped("WRITER", 60, 140 * MS, 5);
+    let Outcome { compared, read, resets, stopped, .. } = flipped("WRITER", 30, 100 * MS, 5);
     println!("{compared:?}, gaps {:?}, notes {:?}, {resets} resets", read.gaps, read.notes);
     assert!(stopped.is_none(), "{stopped:?}");
     assert_eq!(compared.wrong, 0);
     let told: usize = read.gaps.values().sum();
     assert!(told > 0, "no flip had an effect: this has tried nothing");
-    assert!(compared.right > 3_000, "{compared:?}");
+    assert!(compared.right > 1_000, "{compared:?}");
 }
 
 fn five_thousand_in(part: &str, first: u64) {
