@@ -28,11 +28,19 @@ impl Page {
     }
 
     fn sized(width: u32, height: u32) -> Self {
+        Self::within(LivePage::start(), width, height)
+    }
+
+    /// Its memory is measured.
+    fn alone() -> Self {
+        Self::within(LivePage::alone(), 1280, 844)
+    }
+
+    fn within(mut shown: LivePage, width: u32, height: u32) -> Self {
         let dir = tempfile::tempdir().unwrap();
         let html = hums_report::browser::page(&fs::read(browser()).unwrap()).unwrap();
         let path = dir.path().join("hums-check.html");
         fs::write(&path, html).unwrap();
-        let mut shown = LivePage::start();
         shown.open(&format!("file://{}", path.display()), "light", width, height);
         shown.wait("return document.documentElement.dataset.ready === 'true'", 30);
         fs::create_dir(dir.path().join("saved")).unwrap();
@@ -498,7 +506,7 @@ const MB: usize = 1_000_000;
 
 #[test]
 fn a_log_twenty_times_as_large_takes_no_more_memory() {
-    let mut page = Page::open(1280);
+    let mut page = Page::alone();
     let [small, large] = [5, 100].map(|mb| large(page.dir.path(), &format!("{mb}.tlog"), mb * MB));
     let [small, large] = [small, large].map(|log| {
         page.check("#files", &[log]);
@@ -528,7 +536,7 @@ fn a_check_that_ends_early_keeps_its_verdicts_and_an_empty_folder_does_not_end_i
 #[test]
 #[ignore = "takes minutes, and the program of a release: cargo xtask prove browser"]
 fn a_verdict_comes_within_seconds_and_a_file_of_500_mb_at_a_third_of_the_programs_speed() {
-    let mut page = Page::open(1280);
+    let mut page = Page::alone();
     let (ten, other) = (large(page.dir.path(), "10.tlog", 10 * MB), own("px4_hil_quad_low.tlog"));
     let chromium_s = page.first_verdict_s(&ten);
     let html = page.dir.path().join("hums-check.html");
@@ -607,7 +615,7 @@ fn a_program_that_stops_by_itself_or_lacks_memory_ends_with_a_sentence() {
 
 #[test]
 fn a_large_or_hostile_file_is_judged_as_on_the_command_line() {
-    let mut page = Page::open(1280);
+    let mut page = Page::alone();
     let folder = page.dir.path().to_owned();
     for log in [hostile::expanding(&folder), hostile::wide_ulog(&folder), hostile::texts(&folder, 100_000)] {
         let name = log.file_name().unwrap().to_str().unwrap().to_owned();

@@ -11,7 +11,7 @@ use hums_tests::flights::{Manifest, own, root};
 use hums_tests::frames::build_v2;
 use hums_tests::live::{Live, Running, free_port};
 use hums_tests::oracle::LivePage;
-use hums_tests::program::{command, hums};
+use hums_tests::program::{command, hums, hums_with};
 use serde_json::{Value, json};
 
 fn number(text: &str) -> f64 {
@@ -25,21 +25,7 @@ fn shown(page: &Value, name: &str) -> f64 {
 }
 
 fn frames(recording: &Path) -> Vec<Value> {
-    let dir = tempfile::tempdir().unwrap();
-    let (log, out) = (dir.path().join("flight.hum"), dir.path().join("flight.jsonl"));
-    hums([
-        "decode".as_ref(),
-        "--format".as_ref(),
-        "hum".as_ref(),
-        recording.as_os_str(),
-        "-o".as_ref(),
-        log.as_os_str(),
-    ])
-    .expect_code(&[0]);
-    let format = ["--format".as_ref(), "jsonl".as_ref()];
-    hums([&["decode".as_ref(), log.as_os_str(), "-o".as_ref(), out.as_os_str()][..], &format].concat())
-        .expect_code(&[0]);
-    let text = std::fs::read_to_string(out).unwrap();
+    let text = hums_with("decode {} -o - --format jsonl", &[&recording]).expect_code(&[0]).text();
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
@@ -96,7 +82,7 @@ const PANELS: [Panel; 24] = [
 
 #[track_caller]
 fn assert_shows(page: &Value, frames: &[Value]) {
-    // A packed log keeps whole milliseconds.
+    // The page has whole milliseconds.
     let now_s = page["now"].as_f64().unwrap() + 0.0005;
     for (name, message, resolution, value) in PANELS {
         let (says, wanted) = (shown(page, name), value(last(frames, message, now_s)));
@@ -205,7 +191,7 @@ fn each_session_of_a_card_is_played_with_its_parts_as_they_were_then() {
         sim.arg("--store").arg(&store).arg("--params").arg(&params);
         hums_tests::child::run(&mut sim, hums_tests::program::LIMIT).expect_code(&[0]);
     }
-    let info = hums(["info".as_ref(), "--json".as_ref(), card.as_os_str()]).expect_code(&[0]).text();
+    let info = hums_with("info --json {}", &[&card]).expect_code(&[0]).text();
     let info: Value = serde_json::from_str(&info).unwrap();
     let names: Vec<&str> =
         info["logs"].as_array().unwrap().iter().map(|log| log["name"].as_str().unwrap()).collect();

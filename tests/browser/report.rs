@@ -11,7 +11,7 @@ use std::thread;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::frames::build_v2;
 use hums_tests::oracle::LivePage;
-use hums_tests::program::{LIMIT, Machine, Recording, command, hums};
+use hums_tests::program::{LIMIT, Machine, Recording, command, hums_with};
 use hums_tests::{child, oracle};
 use serde_json::Value;
 
@@ -25,7 +25,7 @@ fn json(text: &str) -> Value {
 fn report(source: &Path, codes: &[i32]) -> (tempfile::TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let page = dir.path().join("report.html");
-    hums(["report".as_ref(), source.as_os_str(), "-o".as_ref(), page.as_os_str()]).expect_code(codes);
+    hums_with("report {} -o {}", &[&source, &page]).expect_code(codes);
     (dir, page)
 }
 
@@ -61,10 +61,10 @@ fn around(jsonl: &str, message: &str, at_s: f64, around_s: f64, value: impl Fn(&
 fn a_flights_page_shows_the_flight() {
     let recording = Recording::make(Machine::Sim, &own("ap_quad_faults.tlog"), &[]);
     let (_dir, page) = report(&recording.image(), &[0]);
-    let shown = oracle::browser(&page, &[0.3, 0.5, 0.7]);
+    let shown = LivePage::start().look(&page, &[0.3, 0.5, 0.7]);
     assert_sound(&shown);
 
-    let info = json(&hums(["info".as_ref(), "--json".as_ref(), recording.image().as_os_str()]).text());
+    let info = json(&hums_with("info --json {}", &[&recording.image()]).text());
     let log = &info["logs"][0];
     let findings = shown["findings"].as_array().unwrap();
     let expected = log["findings"].as_array().unwrap();
@@ -137,8 +137,7 @@ fn assert_modes(jsonl: &str, shown: &Value) {
 }
 
 fn assert_pointed_values(image: &Path, shown: &Value) {
-    let mut decode = command(["decode".as_ref(), image.as_os_str()]);
-    let jsonl = child::run(decode.args(["-o", "-", "--format", "jsonl"]), LIMIT).expect_code(&[0]).text();
+    let jsonl = hums_with("decode {} -o - --format jsonl", &[&image]).expect_code(&[0]).text();
     assert_modes(&jsonl, shown);
     let lines: [Line; 6] = [
         ("Wind", "Wind", "WIND", 0.06, |fields| fields["speed"].as_f64().unwrap()),
@@ -171,20 +170,12 @@ fn assert_pointed_values(image: &Path, shown: &Value) {
 fn a_px4_flights_page_shows_its_cells_of_the_recorder_and_a_gap() {
     let dir = tempfile::tempdir().unwrap();
     let log = dir.path().join("flight.hum");
-    hums([
-        "decode".as_ref(),
-        "--format".as_ref(),
-        "hum".as_ref(),
-        own("px4_hil_quad_low.tlog").as_os_str(),
-        "-o".as_ref(),
-        log.as_os_str(),
-    ])
-    .expect_code(&[0]);
+    hums_with("decode --format hum {} -o {}", &[&own("px4_hil_quad_low.tlog"), &log]).expect_code(&[0]);
     let mut bytes = fs::read(&log).unwrap();
     bytes[150 * 512 + 100] ^= 0x10;
     fs::write(&log, bytes).unwrap();
     let (_dir, page) = report(&log, &[3]);
-    let shown = oracle::browser(&page, &[0.5]);
+    let shown = LivePage::start().look(&page, &[0.5]);
     assert_sound(&shown);
     let gaps = shown["gaps"].as_array().unwrap();
     assert_eq!(gaps.len(), 1);
@@ -213,7 +204,7 @@ fn words_of_a_hostile_vehicle_stay_words() {
     fs::write(&file, &data).unwrap();
     let recording = Recording::make(Machine::Sim, &file, &[]);
     let (_dir, page) = report(&recording.image(), &[0]);
-    let shown = oracle::browser(&page, &[0.5]);
+    let shown = LivePage::start().look(&page, &[0.5]);
     assert_sound(&shown);
     assert!(!shown["title"].as_str().unwrap().contains("owned"), "{}", shown["title"]);
     let texts = shown["texts"].as_array().unwrap();
@@ -232,7 +223,7 @@ fn several_sessions_of_a_card_become_a_trend() {
         child::run(sim.arg(own(flight)).arg("--sd").arg(&image), LIMIT).expect_code(&[0]);
     }
     let (_dir, page) = report(&image, &[0]);
-    let shown = oracle::browser(&page, &[0.5]);
+    let shown = LivePage::start().look(&page, &[0.5]);
     assert_sound(&shown);
     let text = shown["text"].as_str().unwrap();
     assert!(text.contains("This session against the 1 session before it on the same card"), "no trend");
@@ -329,7 +320,7 @@ fn a_track_across_the_180th_meridian_is_as_wide_as_the_flight() {
 #[test]
 fn a_finding_stands_with_its_cause_and_with_its_consequences() {
     let (_dir, page) = report(&labelled("f10_gps_off.tlog.gz"), &[0]);
-    let shown = oracle::browser(&page, &[0.5]);
+    let shown = LivePage::start().look(&page, &[0.5]);
     assert_sound(&shown);
     let says = |kind: &str, words: &str| {
         shown[kind].as_array().unwrap().iter().any(|text| text.as_str().unwrap().contains(words))
@@ -363,19 +354,7 @@ fn data_of(path: &Path) -> Value {
 }
 
 fn parameters(recording: &Path) -> BTreeMap<String, u32> {
-    let dir = tempfile::tempdir().unwrap();
-    let log = dir.path().join("flight.hum");
-    hums([
-        "decode".as_ref(),
-        "--format".as_ref(),
-        "hum".as_ref(),
-        recording.as_os_str(),
-        "-o".as_ref(),
-        log.as_os_str(),
-    ])
-    .expect_code(&[0]);
-    let mut decode = command(["decode".as_ref(), log.as_os_str()]);
-    let lines = child::run(decode.args(["-o", "-", "--format", "jsonl"]), LIMIT).expect_code(&[0]).text();
+    let lines = hums_with("decode {} -o - --format jsonl", &[&recording]).expect_code(&[0]).text();
     let values = lines.lines().filter(|line| line.contains("\"PARAM_VALUE\"")).map(json);
     let of_autopilot = values.filter(|entry| entry["component"] == 1);
     let fields = of_autopilot.map(|entry| entry["fields"].clone());
@@ -453,7 +432,7 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
 
 #[track_caller]
 fn assert_times(page: &mut LivePage, recording: &Path) {
-    let info = json(&hums(["info".as_ref(), "--json".as_ref(), recording.as_os_str()]).text());
+    let info = json(&hums_with("info --json {}", &[&recording]).text());
     let findings = info["logs"][0]["findings"].as_array().unwrap();
     let tenths = findings.iter().map(|finding| (finding["time_s"].as_f64().unwrap() * 10.0).round() as u64);
     let expected: Vec<String> =
@@ -725,15 +704,7 @@ fn the_map_has_tiles_of_the_server_that_the_user_named_at_the_place_of_the_fligh
     let page = dir.path().join("report.html");
     let map = format!("http://{address}/{{z}}/{{x}}/{{y}}.png");
     let flight = own("ap_quad_guided.tlog");
-    hums([
-        "report".as_ref(),
-        flight.as_os_str(),
-        "-o".as_ref(),
-        page.as_os_str(),
-        "--map".as_ref(),
-        map.as_ref(),
-    ])
-    .expect_code(&[0]);
+    hums_with("report {} -o {} --map {}", &[&flight, &page, &map]).expect_code(&[0]);
     let mut shown = LivePage::start();
     shown.open(&format!("file://{}", page.display()), "light", 1280, 900);
     let legend = "return document.querySelector('.mapped + .legend')?.textContent.includes('map tiles from')";

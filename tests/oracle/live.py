@@ -2,6 +2,7 @@
 
 usage: live.py CHROMIUM CHROMEDRIVER        a JSON object a line on standard input is answered by one on standard output
 
+  {"do": "new"}                             a new tab without data of the one before, which is closed
   {"do": "open", "url": U, "scheme": "light" | "dark", "width": W, "height": H}
   {"do": "media", "media": "" | "print", "features": {NAME: VALUE}}     the medium and preferences: `prefers-color-scheme`, `prefers-contrast`, ...
   {"do": "pdf", "path": P}                  a print on A4
@@ -12,9 +13,9 @@ usage: live.py CHROMIUM CHROMEDRIVER        a JSON object a line on standard inp
   {"do": "files", "selector": CSS, "paths": [...]}    chooses files, or a folder, in an input
   {"do": "drop", "paths": [...]}            drops files and folders onto the window
   {"do": "downloads", "path": P}            saved files go to this folder
-  {"do": "frames", "seconds": S}            milliseconds of each frame, from its beginning until it is painted
   {"do": "shot", "path": P, "whole": BOOL}  a screenshot, of the window or of the whole page
   {"do": "console"}                         the browser's complaints since the last time
+  {"do": "look", "page": P, "parts": [...]}   the content of a report: see report.py
   {"do": "quit"}                            the end
 """
 
@@ -28,6 +29,8 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
+
+import report
 
 FLAGS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
          "--disable-component-update", "--disable-sync", "--no-first-run", "--disable-default-apps",
@@ -56,19 +59,6 @@ return {
 };
 """
 
-FRAMES = """
-const [seconds, done] = arguments;
-const times = [], end = performance.now() + seconds * 1000, channel = new MessageChannel();
-let began = 0;
-// A message comes after the frame's own work: all programs, style, layout and paint.
-channel.port1.onmessage = () => {
-  times.push(performance.now() - began);
-  if (began < end) requestAnimationFrame(step); else done(times);
-};
-const step = (time) => { began = time; channel.port2.postMessage(null); };
-requestAnimationFrame(step);
-"""
-
 
 def main():
     if len(sys.argv) != 3:
@@ -92,6 +82,18 @@ def main():
 
 def step(driver, asked):
     do = asked["do"]
+    if do == "new":
+        before = driver.current_window_handle
+        driver.switch_to.new_window("tab")
+        tab = driver.current_window_handle
+        driver.switch_to.window(before)
+        driver.close()
+        driver.switch_to.window(tab)
+        driver.execute_cdp_cmd("Storage.clearDataForOrigin", {"origin": "*", "storageTypes": "all"})
+        driver.get_log("browser")
+        return None
+    if do == "look":
+        return report.look(driver, asked["page"], asked["parts"])
     if do == "open":
         size = {"width": asked["width"], "height": asked["height"]}
         driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
@@ -132,8 +134,6 @@ def step(driver, asked):
     if do == "downloads":
         driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": asked["path"]})
         return None
-    if do == "frames":
-        return driver.execute_async_script(FRAMES, asked["seconds"])
     if do == "shot":
         taken = driver.execute_cdp_cmd("Page.captureScreenshot", {"format": "png", "captureBeyondViewport": asked["whole"]})
         with open(asked["path"], "wb") as file:

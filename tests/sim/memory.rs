@@ -17,6 +17,8 @@ use hums_tests::program::{LIMIT, command};
 
 /// KiB above an empty run.
 const ABOVE_KIB_MAX: u64 = 64 << 10;
+/// For inputs of half that size.
+const ABOVE_HALF_MAX: u64 = ABOVE_KIB_MAX / 2;
 
 fn run<A: AsRef<std::ffi::OsStr>>(arguments: &[A]) -> Outcome {
     let mut command = command(arguments);
@@ -33,8 +35,8 @@ fn empty_run(dir: &Path) -> u64 {
 }
 
 #[track_caller]
-fn assert_bounded(what: &str, kib: u64, empty: u64) {
-    assert!(kib <= empty + ABOVE_KIB_MAX, "{what} took {kib} KiB, an empty run {empty} KiB");
+fn assert_bounded(what: &str, kib: u64, kib_max: u64) {
+    assert!(kib <= kib_max, "{what} took {kib} KiB of {kib_max}, an empty run included");
 }
 
 enum Tried {
@@ -79,11 +81,11 @@ fn tried(command: &str) -> Tried {
 }
 
 /// Each reading command and format, also if it refuses the input.
-fn assert_all_bounded(input: &Path, empty: u64) {
-    assert_bounded_but(input, empty, |_| false);
+fn assert_all_bounded(input: &Path, most: u64) {
+    assert_bounded_but(input, most, |_| false);
 }
 
-fn assert_bounded_but(input: &Path, empty: u64, is_left_out: impl Fn(&str) -> bool) {
+fn assert_bounded_but(input: &Path, most: u64, is_left_out: impl Fn(&str) -> bool) {
     let shown = input.to_str().unwrap();
     for command in Cli::command().get_subcommands() {
         match tried(command.get_name()) {
@@ -93,55 +95,55 @@ fn assert_bounded_but(input: &Path, empty: u64, is_left_out: impl Fn(&str) -> bo
                     let out = dir.path().display().to_string();
                     let put = |word: &str| word.replace("IN", shown).replace("OUT", &out);
                     let words: Vec<String> = line.split(' ').map(put).collect();
-                    assert_bounded(&words.join(" "), run(&words).memory_kib_max, empty);
+                    assert_bounded(&words.join(" "), run(&words).memory_kib_max, most);
                 }
             }
-            Tried::Live if !is_left_out("live") => assert_live_bounded(input, empty),
+            Tried::Live if !is_left_out("live") => assert_live_bounded(input, most),
             Tried::Live | Tried::Nothing(_) => {}
         }
     }
 }
 
-fn assert_live_bounded(log: &Path, empty: u64) {
+fn assert_live_bounded(log: &Path, most: u64) {
     let Some(live) = Live::attempt(&[log.to_str().unwrap()]) else { return };
     let (mut before, mut quiet) = (0.0, 0);
-    let most = loop {
+    let taken = loop {
         thread::sleep(Duration::from_millis(300));
-        let (seconds, _, most) = live.program.cost().expect("it runs");
+        let (seconds, peak) = live.program.cost().expect("it runs");
         // In playback it publishes ten times a second, which takes nearly no time.
         quiet = if seconds - before < 0.06 { quiet + 1 } else { 0 };
         before = seconds;
         if quiet == 4 {
-            break most;
+            break peak;
         }
     };
-    assert_bounded(&format!("live of {}", log.display()), most, empty);
+    assert_bounded(&format!("live of {}", log.display()), taken, most);
 }
 
 #[test]
 fn a_log_that_expands_two_thousand_fold_takes_little_memory_with_any_command() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
-    let log = hostile::heartbeats(dir.path(), 400_000);
-    assert!(fs::metadata(&log).unwrap().len() < 200_000);
-    assert_all_bounded(&log, empty);
+    let most = empty_run(dir.path()) + ABOVE_HALF_MAX;
+    let log = hostile::heartbeats(dir.path(), 200_000);
+    assert!(fs::metadata(&log).unwrap().len() < 100_000);
+    assert_all_bounded(&log, most);
 }
 
 #[test]
 fn logs_of_one_kind_of_message_take_little_memory_with_any_command() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
+    let most = empty_run(dir.path()) + ABOVE_KIB_MAX;
     for log in [hostile::texts(dir.path(), 100_000), hostile::parameters(dir.path(), 60_000)] {
-        assert_all_bounded(&log, empty);
+        assert_all_bounded(&log, most);
     }
 }
 
 #[test]
 fn a_log_of_many_unknown_ids_takes_little_memory_and_few_files() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
+    let most = empty_run(dir.path()) + ABOVE_KIB_MAX;
     let ids = hostile::unknown_ids(dir.path(), 60_000);
-    assert_all_bounded(&ids, empty);
+    assert_all_bounded(&ids, most);
     let out = dir.path().join("tables");
     let words = ["decode", ids.to_str().unwrap(), "--format", "csv", "-o", out.to_str().unwrap()];
     let said = run(&words).text();
@@ -160,30 +162,30 @@ fn a_log_of_many_unknown_ids_takes_little_memory_and_few_files() {
 #[test]
 fn an_autopilots_log_of_thousands_of_tables_or_columns_takes_little_memory() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
+    let most = empty_run(dir.path()) + ABOVE_KIB_MAX;
     for log in [
         hostile::wide_ulog(dir.path()),
         hostile::long_arrays(dir.path()),
         hostile::wide_dataflash(dir.path()),
     ] {
-        assert_all_bounded(&log, empty);
+        assert_all_bounded(&log, most);
     }
 }
 
 #[test]
 fn an_autopilots_log_that_is_larger_than_what_may_be_held_takes_little_memory_with_any_command() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
+    let most = empty_run(dir.path()) + ABOVE_KIB_MAX;
     for log in [hostile::long_dataflash(dir.path()), hostile::long_ulog(dir.path())] {
         assert!(fs::metadata(&log).unwrap().len() > ABOVE_KIB_MAX << 10);
-        assert_all_bounded(&log, empty);
+        assert_all_bounded(&log, most);
     }
 }
 
 #[test]
 fn the_logs_of_a_large_folder_are_told_one_by_one() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
+    let most = empty_run(dir.path()) + ABOVE_KIB_MAX;
     let first = fs::read(hostile::heartbeats(dir.path(), 10)).unwrap();
     let logs = dir.path().join("logs");
     fs::create_dir(&logs).unwrap();
@@ -193,7 +195,7 @@ fn the_logs_of_a_large_folder_are_told_one_by_one() {
     for command in [&["info", "--verify", "--json"][..], &["info", "--json"]] {
         let outcome = run(&[command, &[logs.to_str().unwrap()]].concat());
         let command = command.join(" ");
-        assert_bounded(&command, outcome.memory_kib_max, empty);
+        assert_bounded(&command, outcome.memory_kib_max, most);
         let told: serde_json::Value = serde_json::from_str(&outcome.text()).unwrap();
         assert_eq!(told["logs"].as_array().unwrap().len(), 4_000, "{command}");
         assert_eq!(command.contains("--verify"), told["ok"].is_boolean(), "{command}");
@@ -203,36 +205,36 @@ fn the_logs_of_a_large_folder_are_told_one_by_one() {
 #[test]
 fn eight_vehicles_with_all_that_is_drawn_take_little_memory_live() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
-    assert_live_bounded(&hostile::fleet(dir.path(), 8, 110), empty);
+    let most = empty_run(dir.path()) + ABOVE_KIB_MAX;
+    assert_live_bounded(&hostile::fleet(dir.path(), 8, 110), most);
 }
 
 #[test]
 fn what_is_recorded_and_packed_and_a_cards_image_take_little_memory_with_any_command() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
+    let most = empty_run(dir.path()) + ABOVE_KIB_MAX;
     let tlog = hostile::fleet(dir.path(), 8, 110);
     let raw = hostile::raw_heartbeats(dir.path(), 300_000);
-    assert_all_bounded(&tlog, empty);
-    assert_all_bounded(&raw, empty);
+    assert_all_bounded(&tlog, most);
+    assert_all_bounded(&raw, most);
     let image = dir.path().join("card.img");
     run(&["sim".as_ref(), tlog.as_os_str(), "--sd".as_ref(), image.as_os_str()]);
-    assert_all_bounded(&image, empty);
+    assert_all_bounded(&image, most);
 }
 
 #[test]
 fn what_a_compressed_recording_expands_to_and_a_line_without_an_end_take_little_memory() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
+    let most = empty_run(dir.path()) + ABOVE_KIB_MAX;
     for input in [hostile::expanding(dir.path()), hostile::long_line(dir.path())] {
-        assert_all_bounded(&input, empty);
+        assert_all_bounded(&input, most);
     }
 }
 
 #[test]
 fn files_of_parameters_keys_and_images_without_an_end_are_refused_and_take_little_memory() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
+    let most = empty_run(dir.path()) + ABOVE_KIB_MAX;
     let log = hostile::heartbeats(dir.path(), 10).display().to_string();
     let raw = hostile::raw_heartbeats(dir.path(), 10).display().to_string();
     let image = dir.path().join("card.img").display().to_string();
@@ -247,7 +249,7 @@ fn files_of_parameters_keys_and_images_without_an_end_are_refused_and_take_littl
         let outcome = run(words);
         assert!(matches!(outcome.code, Some(1 | 2)), "{words:?}: {}", outcome.stderr);
         assert!(outcome.stderr.contains("/dev/zero: "), "{words:?}: {}", outcome.stderr);
-        assert_bounded(&words.join(" "), outcome.memory_kib_max, empty);
+        assert_bounded(&words.join(" "), outcome.memory_kib_max, most);
     }
 }
 
@@ -255,29 +257,29 @@ fn files_of_parameters_keys_and_images_without_an_end_are_refused_and_take_littl
 #[test]
 fn a_log_of_very_many_sessions_takes_little_memory_with_any_command() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
-    let count = std::env::var("HUMS_SESSIONS").map_or(100_000, |count| count.parse().unwrap());
-    assert_all_bounded(&hostile::starts(dir.path(), count), empty);
+    let most = empty_run(dir.path()) + ABOVE_HALF_MAX;
+    let count = std::env::var("HUMS_SESSIONS").map_or(70_000, |count| count.parse().unwrap());
+    assert_all_bounded(&hostile::starts(dir.path(), count), most);
 }
 
 /// 16 MiB, the longest file whose lost sectors are rebuilt, and a longer one.
 #[test]
 fn a_file_of_nothing_but_parity_takes_little_memory() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
-    for blocks in [(32 << 10) - 1, 200 << 10] {
+    let most = empty_run(dir.path()) + ABOVE_HALF_MAX;
+    for blocks in [(32 << 10) - 1, 70 << 10] {
         let log = hostile::parity(dir.path(), blocks);
-        assert_all_bounded(&log, empty);
+        assert_all_bounded(&log, most);
     }
 }
 
 #[test]
 fn cards_full_of_entries_or_sessions_take_little_memory() {
     let dir = tempfile::tempdir().unwrap();
-    let empty = empty_run(dir.path());
+    let most = empty_run(dir.path()) + ABOVE_KIB_MAX;
     for bogus in [false, true] {
-        assert_all_bounded(&hostile::directories(dir.path(), 12, bogus), empty);
+        assert_all_bounded(&hostile::directories(dir.path(), 12, bogus), most);
     }
     // `decode` would make a file for each of these sessions.
-    assert_bounded_but(&hostile::sessions(dir.path(), 60_000), empty, |line| line.starts_with("decode "));
+    assert_bounded_but(&hostile::sessions(dir.path(), 60_000), most, |line| line.starts_with("decode "));
 }

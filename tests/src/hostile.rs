@@ -14,7 +14,7 @@ use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 use hums_recorder::layout::Layout;
 
-use crate::program::hums;
+use crate::program::{hums, hums_with};
 
 /// HEARTBEAT of an `ArduPilot` quadrotor, MAVLink 1.
 const HEARTBEAT: [u8; 17] = [0xfe, 9, 0x4e, 1, 1, 0, 0, 0, 0, 0, 2, 3, 0x51, 4, 3, 0x1c, 0x7f];
@@ -28,15 +28,7 @@ fn packed(dir: &Path, name: &str, raw: &[u8]) -> PathBuf {
     if log.exists() {
         fs::remove_file(&log).unwrap();
     }
-    hums([
-        "decode".as_ref(),
-        "--format".as_ref(),
-        "hum".as_ref(),
-        recording.as_os_str(),
-        "-o".as_ref(),
-        log.as_os_str(),
-    ])
-    .expect_code(&[0]);
+    hums_with("decode --format hum {} -o {}", &[&recording, &log]).expect_code(&[0]);
     fs::remove_file(recording).unwrap();
     log
 }

@@ -2,7 +2,6 @@
 
 use std::io::{BufRead as _, BufReader, Lines, Read as _, Write as _};
 use std::net::{TcpStream, UdpSocket};
-use std::path::Path;
 use std::process::{Child, ChildStderr, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -38,18 +37,16 @@ impl Running {
         }
     }
 
-    /// Processor time, seconds; memory now and at most, KiB.
-    pub fn cost(&self) -> Option<(f64, u64, u64)> {
+    /// Processor time, seconds; memory at most, KiB.
+    pub fn cost(&self) -> Option<(f64, u64)> {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.0.id())).ok()?;
         // After the name, which may contain spaces.
         let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
         let ticks: u64 = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.0.id())).ok()?;
-        let kib = |name: &str| -> Option<u64> {
-            status.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
-        };
+        let most = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
         // Linux counts in hundredths here.
-        Some((ticks as f64 / 100.0, kib("VmRSS:")?, kib("VmHWM:")?))
+        Some((ticks as f64 / 100.0, most.split_whitespace().next()?.parse().ok()?))
     }
 }
 
@@ -67,24 +64,18 @@ impl Live {
     /// Starts it with these arguments, at a free port.
     #[track_caller]
     pub fn start(arguments: &[&str]) -> Self {
-        Self::start_at(crate::program::path(), arguments)
-    }
-
-    /// As [`Self::start`], with the program at this path.
-    #[track_caller]
-    pub fn start_at(program: &Path, arguments: &[&str]) -> Self {
-        Self::attempt_at(program, arguments).unwrap_or_else(|words| panic!("no address: {words}"))
+        Self::start_or_words(arguments).unwrap_or_else(|words| panic!("no address: {words}"))
     }
 
     /// None if it ends with an error.
     #[track_caller]
     pub fn attempt(arguments: &[&str]) -> Option<Self> {
-        Self::attempt_at(crate::program::path(), arguments).ok()
+        Self::start_or_words(arguments).ok()
     }
 
     #[track_caller]
-    fn attempt_at(program: &Path, arguments: &[&str]) -> Result<Self, String> {
-        let mut command = Command::new(program);
+    fn start_or_words(arguments: &[&str]) -> Result<Self, String> {
+        let mut command = Command::new(crate::program::path());
         command
             .args(["live", "--listen", "127.0.0.1:0"])
             .args(arguments)

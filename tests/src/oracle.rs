@@ -3,6 +3,7 @@
 use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::Mutex;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -110,51 +111,74 @@ pub fn grafana(dashboards: &[PathBuf]) -> Value {
     json(&run("grafana.py", dashboards))
 }
 
-/// A page with the mouse at these parts of each plot: `tests/oracle/browser.py`.
-pub fn browser(page: &Path, parts: &[f32]) -> Value {
-    let chromium = program("HUMS_CHROMIUM", "/usr/bin/chromium");
-    let driver = program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver");
-    let parts = parts.iter().map(|part| PathBuf::from(part.to_string()));
-    json(&run(
-        "browser.py",
-        &[chromium, driver, page.to_owned()].into_iter().chain(parts).collect::<Vec<_>>(),
-    ))
-}
-
 /// The check in Firefox: `tests/oracle/firefox.py`.
 pub fn firefox(page: &Path, logs: &[PathBuf]) -> Value {
     let arguments = [&[program("HUMS_FIREFOX", "/usr/bin/firefox-esr"), page.to_owned()], logs].concat();
     json(&run("firefox.py", &arguments))
 }
 
-/// A page of `hums live`: `tests/oracle/live.py`. Ends with the browser.
-pub struct LivePage {
-    browser: Child,
+/// A Chromium and the script that moves it: `tests/oracle/live.py`, which ends at the end of its input.
+struct Browser {
+    script: Child,
     asked: ChildStdin,
     answers: Lines<BufReader<ChildStdout>>,
 }
 
-impl LivePage {
-    /// Starts the browser.
-    ///
-    /// # Panics
-    /// There is no browser.
-    pub fn start() -> Self {
+impl Browser {
+    fn start() -> Self {
         let mut command = Command::new(from_environment("HUMS_PYTHON", "target/venv/bin/python"));
         command.arg(root().join("tests/oracle/live.py")).env("PYTHONDONTWRITEBYTECODE", "1");
         command.arg(program("HUMS_CHROMIUM", "/usr/bin/chromium"));
         command.arg(program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver"));
-        let mut browser = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("python runs");
-        let asked = browser.stdin.take().expect("it is piped");
-        let answers = BufReader::new(browser.stdout.take().expect("it is piped")).lines();
-        Self { browser, asked, answers }
+        let mut script = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("python runs");
+        let asked = script.stdin.take().expect("it is piped");
+        let answers = BufReader::new(script.stdout.take().expect("it is piped")).lines();
+        Self { script, asked, answers }
+    }
+}
+
+/// Started ones that no test uses: a start takes seconds.
+static IDLE: Mutex<Vec<Browser>> = Mutex::new(Vec::new());
+
+/// A page in a tab of its own, which is closed at its end.
+pub struct LivePage {
+    /// None: at its end.
+    browser: Option<Browser>,
+    is_shared: bool,
+}
+
+impl LivePage {
+    /// A tab of a browser that other tests use one after the other.
+    ///
+    /// # Panics
+    /// There is no browser.
+    pub fn start() -> Self {
+        let idle = IDLE.lock().expect("nothing fails under it").pop();
+        let mut page = Self { browser: Some(idle.unwrap_or_else(Browser::start)), is_shared: true };
+        page.ask(&serde_json::json!({ "do": "new" }));
+        page
+    }
+
+    /// The page of a browser of its own, which no other page has used memory of.
+    ///
+    /// # Panics
+    /// There is no browser.
+    pub fn alone() -> Self {
+        Self { browser: Some(Browser::start()), is_shared: false }
     }
 
     #[track_caller]
     fn ask(&mut self, what: &Value) -> Value {
-        writeln!(self.asked, "{what}").expect("the browser's script has ended");
-        let answer = self.answers.next().and_then(Result::ok);
+        let browser = self.browser.as_mut().expect("it has one until its end");
+        writeln!(browser.asked, "{what}").expect("the browser's script has ended");
+        let answer = browser.answers.next().and_then(Result::ok);
         json(&answer.unwrap_or_else(|| panic!("the browser's script has ended at {what}")))
+    }
+
+    /// A report with the mouse at these parts of each plot: `tests/oracle/report.py`.
+    #[track_caller]
+    pub fn look(&mut self, report: &Path, parts: &[f32]) -> Value {
+        self.ask(&serde_json::json!({ "do": "look", "page": report, "parts": parts }))
     }
 
     /// Opens an address, in a window of this size.
@@ -219,13 +243,6 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "downloads", "path": folder }));
     }
 
-    /// Milliseconds until each frame is painted.
-    #[track_caller]
-    pub fn frames_ms(&mut self, seconds: u32) -> Vec<f64> {
-        let frames = self.ask(&serde_json::json!({ "do": "frames", "seconds": seconds }));
-        frames.as_array().expect("a list").iter().filter_map(Value::as_f64).collect()
-    }
-
     /// The window, or the whole page.
     #[track_caller]
     pub fn shot(&mut self, path: &Path, whole: bool) {
@@ -247,7 +264,8 @@ impl LivePage {
         };
         let all = std::fs::read_dir("/proc").expect("processes").flatten();
         let all: Vec<u32> = all.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect();
-        let (mut family, mut peak) = (vec![self.browser.id()], None);
+        let (mut family, mut peak): (Vec<u32>, _) =
+            (self.browser.iter().map(|one| one.script.id()).collect(), None);
         while let Some(pid) = family.pop() {
             family.extend(all.iter().filter(|child| number(child, "PPid:") == Some(u64::from(pid))));
             if of(&pid, "cmdline").contains("--type=renderer") {
@@ -266,16 +284,21 @@ impl LivePage {
 
 impl Drop for LivePage {
     fn drop(&mut self) {
+        let Some(mut browser) = self.browser.take() else { return };
+        if self.is_shared && !std::thread::panicking() {
+            IDLE.lock().expect("nothing fails under it").push(browser);
+            return;
+        }
         // Ends at end of input; a hanging script is ended.
-        let _ = self.asked.write_all(b"{\"do\": \"quit\"}\n");
+        let _ = browser.asked.write_all(b"{\"do\": \"quit\"}\n");
         for _ in 0..100 {
-            if !matches!(self.browser.try_wait(), Ok(None)) {
+            if !matches!(browser.script.try_wait(), Ok(None)) {
                 return;
             }
             std::thread::sleep(Duration::from_millis(50));
         }
-        let _ = self.browser.kill();
-        let _ = self.browser.wait();
+        let _ = browser.script.kill();
+        let _ = browser.script.wait();
     }
 }
 

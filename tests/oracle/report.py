@@ -1,7 +1,4 @@
-"""Opens a report in Chromium and prints its content.
-
-usage: browser.py CHROMIUM CHROMEDRIVER PAGE PART...        prints JSON
-  PART          how far from the left the mouse points in each plot, 0 to 1
+"""A report in Chromium: `look` returns its content.
 
   console       the browser's complaints
   requests      addresses that the page requested, except its own
@@ -16,20 +13,12 @@ usage: browser.py CHROMIUM CHROMEDRIVER PAGE PART...        prints JSON
   because, consequences   causes of findings, and their effects
   map           the part of the map's pixels that is drawn on
   width         of the page and of the window, at the width of a phone
+
+The mouse points at each of `parts`: how far from the left in each plot, 0 to 1.
 """
 
-import json
-import sys
-import tempfile
-
-from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.support.ui import WebDriverWait
-
-FLAGS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
-         "--disable-component-update", "--disable-sync", "--no-first-run", "--disable-default-apps",
-         "--force-device-scale-factor=1", "--window-size=1280,1000"]
 
 # The part of a canvas whose pixels differ from the commonest one.
 DRAWN = """
@@ -107,25 +96,10 @@ def point(driver, plot, part, time_range):
     return {"time_s": at, "values": driver.execute_script(VALUES, plot)}
 
 
-def main():
-    if len(sys.argv) < 5:
-        sys.exit(__doc__)
-    options = webdriver.ChromeOptions()
-    options.binary_location = sys.argv[1]
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    with tempfile.TemporaryDirectory() as profile:
-        for flag in [*FLAGS, f"--user-data-dir={profile}"]:
-            options.add_argument(flag)
-        driver = webdriver.Chrome(options=options, service=Service(sys.argv[2]))
-        try:
-            print(json.dumps(look(driver, sys.argv[3], [float(part) for part in sys.argv[4:]])))
-        finally:
-            driver.quit()
-
-
 def look(driver, page, parts):
-    address = f"file://{page}"
-    driver.get(address)
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                           {"width": 1280, "height": 1000, "deviceScaleFactor": 1, "mobile": False})
+    driver.get(f"file://{page}")
     WebDriverWait(driver, 60).until(
         lambda driver: driver.execute_script("return document.documentElement.dataset.ready") == "true")
     # Plots that never change fold away; the mouse points at each.
@@ -161,13 +135,7 @@ def look(driver, page, parts):
         lambda driver: driver.execute_script("return document.querySelector('.plot .uplot')?.clientWidth ?? 0") < 390)
     shown["width"] = driver.execute_script("return [document.documentElement.scrollWidth, innerWidth]")
     shown["console"] = [entry["message"] for entry in driver.get_log("browser")]
-    events = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
-    # The browser's own first tab makes requests too.
-    asked = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
-    urls = {request["request"]["url"] for request in asked if request["documentURL"] == address}
-    shown["requests"] = sorted(url for url in urls if url != address and not url.startswith("data:"))
+    asked = driver.execute_script("return performance.getEntriesByType('resource').map(({ name }) => name)")
+    shown["requests"] = [url for url in asked if not url.startswith("data:")]
     return shown
 
-
-if __name__ == "__main__":
-    main()
