@@ -5,7 +5,7 @@ use std::path::Path;
 
 use hums_tests::child;
 use hums_tests::flights::own;
-use hums_tests::program::{LIMIT, command, hums};
+use hums_tests::program::{LIMIT, command, hums_with};
 
 const FORMATS: &str = "tlog,csv,jsonl,influx,parquet,thesis,mcap,ulog,kml,gpx,srt";
 
@@ -13,15 +13,7 @@ const FORMATS: &str = "tlog,csv,jsonl,influx,parquet,thesis,mcap,ulog,kml,gpx,sr
 fn what_is_left_of_a_damaged_log_is_in_every_format_and_in_its_report() {
     let dir = tempfile::tempdir().unwrap();
     let log = dir.path().join("log.hum");
-    hums([
-        "decode".as_ref(),
-        "--format".as_ref(),
-        "hum".as_ref(),
-        own("px4_hil_quad_low.tlog").as_os_str(),
-        "-o".as_ref(),
-        log.as_os_str(),
-    ])
-    .expect_code(&[0]);
+    hums_with("decode --format hum {} -o {}", &[&own("px4_hil_quad_low.tlog"), &log]).expect_code(&[0]);
     let whole = fs::read(&log).unwrap();
     let middle = whole.len() / 1024 * 512;
     let mut zeroed = whole.clone();
@@ -41,7 +33,7 @@ fn what_is_left_of_a_damaged_log_is_in_every_format_and_in_its_report() {
         let page = dir.path().join(format!("{name}.html"));
         let mut decode = command(["decode".as_ref(), damaged.as_os_str(), "-o".as_ref(), out.as_os_str()]);
         child::run(decode.args(["--format", FORMATS]), LIMIT).expect_code(&[code]);
-        hums(["report".as_ref(), damaged.as_os_str(), "-o".as_ref(), page.as_os_str()]).expect_code(&[code]);
+        hums_with("report {} -o {}", &[&damaged, &page]).expect_code(&[code]);
         if code == 1 {
             assert!(!page.exists() && !out.exists(), "{name}: nothing is made of nothing");
             continue;
@@ -62,6 +54,12 @@ fn what_is_left_of_a_damaged_log_is_in_every_format_and_in_its_report() {
         assert_eq!(read("/HUMS_GAP.csv").lines().count(), 2, "{name}");
         assert_eq!(read(".thesis/gaps.csv").lines().count(), 2, "{name}");
         assert_eq!(read(".tlog.gaps.csv").lines().count(), 2, "{name}");
+        assert!(out.join("HUMS_GAP").is_dir(), "{name}: a table in Parquet");
+        let values = read(".thesis/flightvalues.csv");
+        let seconds: Vec<u64> =
+            values.lines().skip(1).filter_map(|row| row.split_once('s')?.0.parse().ok()).collect();
+        let is_gap = |pair: &[u64]| pair[1] > pair[0] + 1;
+        assert!(seconds.windows(2).any(is_gap) || name == "headless" || name == "cut", "{name}: {seconds:?}");
         let html = fs::read_to_string(page).unwrap();
         assert!(html.contains("\"gaps_count\":1"), "{name}");
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use hums_tests::flights::root;
 use hums_tests::oracle;
-use hums_tests::program::hums;
+use hums_tests::program::hums_with;
 use serde_json::json;
 
 /// `at_least`: the least counts.
@@ -15,30 +15,14 @@ fn read(recording: &str, at_least: &[(&str, u64)]) {
     let (input, out) = (root().join("tests").join(recording), dir.path());
     let log = out.join("log.hum");
     let input = if recording.contains(".tlog") {
-        hums([
-            "decode".as_ref(),
-            input.as_os_str(),
-            "-o".as_ref(),
-            log.as_os_str(),
-            "--format".as_ref(),
-            "hum".as_ref(),
-        ])
-        .expect_code(&[0, 3]);
+        hums_with("decode {} -o {} --format hum", &[&input, &log]).expect_code(&[0, 3]);
         log
     } else {
         input
     };
     let files = out.join("files");
     let formats = "jsonl,mcap,ulog,kml,gpx,srt";
-    hums([
-        "decode".as_ref(),
-        input.as_os_str(),
-        "-o".as_ref(),
-        files.as_os_str(),
-        "--format".as_ref(),
-        formats.as_ref(),
-    ])
-    .expect_code(&[0, 3]);
+    hums_with("decode {} -o {} --format {}", &[&input, &files, &formats]).expect_code(&[0, 3]);
     let names = fs::read_dir(&files).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let jsonl =
         names.into_iter().find(|name| Path::new(name).extension().is_some_and(|end| end == "jsonl")).unwrap();

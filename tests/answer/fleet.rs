@@ -8,7 +8,7 @@ use hums_dialect::crc;
 use hums_tests::child;
 use hums_tests::flights::{own, root};
 use hums_tests::oracle;
-use hums_tests::program::{LIMIT, command, hums};
+use hums_tests::program::{LIMIT, command, hums_with};
 use serde_json::Value;
 
 fn cards(dir: &Path) {
@@ -25,29 +25,13 @@ fn cards(dir: &Path) {
     }
     // Recorders without checks: a packed recording, and one of an unknown vehicle.
     let packed = dir.join("cards/packed.hum");
-    hums([
-        "decode".as_ref(),
-        "--format".as_ref(),
-        "hum".as_ref(),
-        own("ap_quad_faults.tlog").as_os_str(),
-        "-o".as_ref(),
-        packed.as_os_str(),
-    ])
-    .expect_code(&[0]);
+    hums_with("decode --format hum {} -o {}", &[&own("ap_quad_faults.tlog"), &packed]).expect_code(&[0]);
     let (raw, silent) = (dir.join("silent.raw"), dir.join("cards/silent.hum"));
     // A SYSTEM_TIME and no heartbeat.
     let frame = [0xfe, 12, 0, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0];
     let crc = crc::step(crc::update(crc::START, &frame[1..]), 137);
     fs::write(&raw, [&frame[..], &crc.to_le_bytes()].concat().repeat(100)).unwrap();
-    hums([
-        "decode".as_ref(),
-        "--format".as_ref(),
-        "hum".as_ref(),
-        raw.as_os_str(),
-        "-o".as_ref(),
-        silent.as_os_str(),
-    ])
-    .expect_code(&[0]);
+    hums_with("decode --format hum {} -o {}", &[&raw, &silent]).expect_code(&[0]);
 }
 
 fn rows(results: &Value, heading: &str) -> Vec<Value> {
@@ -75,7 +59,7 @@ fn the_documents_queries_answer_what_the_cards_say() {
     };
     decode("parquet", &fleet);
     decode("parquet", &fleet);
-    let info = hums(["info".as_ref(), "--json".as_ref(), cards.as_os_str()]).expect_code(&[0]).text();
+    let info = hums_with("info --json {}", &[&cards]).expect_code(&[0]).text();
     let info: Value = serde_json::from_str(&info).unwrap();
     let logs = info["logs"].as_array().unwrap();
     assert_eq!(logs.len(), 5, "three sessions on two cards, and two packed recordings");

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use hums_tests::flights::root;
 use hums_tests::live::Live;
-use hums_tests::program::hums;
+use hums_tests::program::{hums, hums_with};
 use serde_json::Value;
 
 /// Results of its makers' own tools.
@@ -42,7 +42,7 @@ impl Known {
 
     fn checked(&self) -> Value {
         let path = self.path();
-        let text = hums(["check".as_ref(), "--json".as_ref(), path.as_os_str()]).expect_code(&[4]).text();
+        let text = hums_with("check --json {}", &[&path]).expect_code(&[4]).text();
         let checked: Value = serde_json::from_str(&text).unwrap();
         assert!(findings(&checked).iter().any(|finding| finding.contains(self.fault)), "{checked}");
         checked
@@ -82,7 +82,7 @@ fn agrees(log: &Value, known: &Known, checked: &Value) {
 
 fn info(known: &Known) {
     let (path, checked) = (known.path(), known.checked());
-    let text = hums(["info".as_ref(), "--json".as_ref(), path.as_os_str()]).expect_code(&[0]).text();
+    let text = hums_with("info --json {}", &[&path]).expect_code(&[0]).text();
     let json: Value = serde_json::from_str(&text).unwrap();
     agrees(&json["logs"][0], known, &checked);
 }
@@ -95,7 +95,7 @@ fn data(page: &str) -> Value {
 fn report(known: &Known) {
     let (path, checked, dir) = (known.path(), known.checked(), tempfile::tempdir().unwrap());
     let page = dir.path().join("page.html");
-    hums(["report".as_ref(), path.as_os_str(), "-o".as_ref(), page.as_os_str()]).expect_code(&[0]);
+    hums_with("report {} -o {}", &[&path, &page]).expect_code(&[0]);
     let data = data(&fs::read_to_string(page).unwrap());
     agrees(&data["log"], known, &checked);
     let flights = checked["flights"].as_array().unwrap();

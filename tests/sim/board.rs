@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use hums_tests::flights::own;
 use hums_tests::live::free_port;
-use hums_tests::program::{self, hums};
+use hums_tests::program::{self, hums_with};
 use tempfile::TempDir;
 
 pub(crate) struct Board {
@@ -41,8 +41,7 @@ impl Board {
     pub(crate) fn end(self) -> String {
         let dir = self.switch_off();
         let image = dir.path().join("card.img");
-        let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), "-".as_ref()];
-        hums(command.into_iter().chain(["--format".as_ref(), "jsonl".as_ref()])).expect_code(&[0]).text()
+        hums_with("decode {} -o - --format jsonl", &[&image]).expect_code(&[0]).text()
     }
 
     /// Keeps the folder with card and store.

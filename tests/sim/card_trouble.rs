@@ -40,25 +40,29 @@ fn a_card_that_is_missing_throughout_loses_counted_frames_and_no_more() {
     assert!(recording.number("gs_frames") > 100, "the ground station is served all the same");
 }
 
+/// By each row: its options, and the least percentage of frames that are logged.
 #[test]
-fn a_card_that_comes_late_gets_the_rest() {
-    let (recording, lost) = assert_accounted(&["--card-out", "0..200", "--card-size", "64"]);
-    assert!(lost > 0 && recording.number("frames_logged") > 0);
-    fat::assert_clean(&recording.image());
+fn trouble_of_a_card_costs_counted_frames_and_leaves_a_good_file_system() {
+    for (flags, percent_min) in [
+        (&["--card-out", "0..200"][..], 5),
+        (&["--card-out", "30..200"], 25),
+        // The queue holds that long at the rate of a telemetry port.
+        (&["--card-out", "100..130"], 100),
+        (&["--stall", "100000@50"], 10),
+    ] {
+        let (recording, lost) = assert_accounted(&[flags, &["--card-size", "64"]].concat());
+        let percent = 100 * recording.number("frames_logged") / recording.number("frames_in");
+        assert!(percent >= percent_min && (lost == 0) == (percent_min == 100), "{flags:?}: {lost} lost");
+        fat::assert_clean(&recording.image());
+    }
 }
 
 #[test]
-fn a_card_that_is_taken_out_and_put_back_misses_only_that_time() {
-    let (recording, lost) = assert_accounted(&["--card-out", "30..200", "--card-size", "64"]);
-    let frames = recording.number("frames_in");
-    assert!(lost > 0 && lost < frames * 3 / 4, "{lost} of {frames} lost in 170 of 251 s");
+fn write_errors_are_retried_and_what_stays_is_counted() {
+    let (recording, _) = assert_accounted(&["--write-error", "0.01", "--seed", "4", "--card-size", "64"]);
     fat::assert_clean(&recording.image());
-}
-
-#[test]
-fn a_run_that_writes_over_its_own_first_files_counts_their_frames_as_lost() {
-    let flags = ["--write-error", "0.75", "--seed", "3", "--card-size", "40"];
-    let (recording, lost) = assert_accounted(&flags);
+    // It writes over its own first files: their frames count as lost.
+    let (recording, lost) = assert_accounted(&["--write-error", "0.75", "--seed", "3", "--card-size", "40"]);
     assert!(lost > 0 && recording.number("frames_logged") > 0, "{lost} lost");
 }
 
@@ -68,34 +72,6 @@ fn a_card_that_never_comes_back_holds_what_was_written_and_the_pilot_is_told() {
     assert!(lost > 0 && recording.number("frames_logged") > 0);
     let json: serde_json::Value = serde_json::from_str(&recording.outcome.text()).unwrap();
     assert!(json["findings"].to_string().contains("recording"), "a stopped recorder is told: {json}");
-}
-
-#[test]
-fn a_card_that_is_out_for_half_a_minute_misses_nothing() {
-    let (recording, lost) = assert_accounted(&["--card-out", "100..130", "--card-size", "64"]);
-    assert_eq!(lost, 0, "the queue holds that long at the rate of a telemetry port");
-    fat::assert_clean(&recording.image());
-}
-
-#[test]
-fn a_stall_of_a_second_loses_nothing() {
-    let (recording, lost) = assert_accounted(&["--stall", "1000@50", "--stall", "1000@120"]);
-    assert_eq!(lost, 0);
-    // The box writes every 200 ms at least: it notices a stall then.
-    assert!(recording.number("sd_stall_ms_max") >= 800);
-    assert!(recording.number("queue_bytes_max") <= recording.number("queue_bytes_capacity"));
-}
-
-#[test]
-fn a_stall_longer_than_the_queue_loses_counted_frames() {
-    let (_, lost) = assert_accounted(&["--stall", "100000@50"]);
-    assert!(lost > 0);
-}
-
-#[test]
-fn write_errors_are_retried_and_what_stays_is_counted() {
-    let (recording, _) = assert_accounted(&["--write-error", "0.01", "--seed", "4", "--card-size", "64"]);
-    fat::assert_clean(&recording.image());
 }
 
 #[test]

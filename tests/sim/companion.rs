@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use hums_tests::flights::{own, root};
 use hums_tests::oracle;
-use hums_tests::program::hums;
+use hums_tests::program::{hums, hums_with};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -109,8 +109,7 @@ fn once_there_is_a_key_only_what_is_signed_with_it_and_new_does_anything_also_af
 
 fn statistic(dir: &TempDir, name: &str) -> Vec<u64> {
     let (image, out) = (dir.path().join("card.img"), dir.path().join("decoded"));
-    let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), out.as_os_str()];
-    hums(command.into_iter().chain(["--format".as_ref(), "jsonl".as_ref()])).expect_code(&[0, 3]);
+    hums_with("decode {} -o {} --format jsonl", &[&image, &out]).expect_code(&[0, 3]);
     let logs = fs::read_dir(out).unwrap().map(|log| fs::read_to_string(log.unwrap().path()).unwrap());
     logs.map(|log| {
         let mut rows = log.lines().rev().map(|line| serde_json::from_str::<Value>(line).unwrap());
@@ -145,7 +144,7 @@ fn assert_what_passes(said: &Value, dir: &TempDir) {
     assert_eq!((before.len(), after.len()), (2, 1), "erased but for the one in work: {said}");
     // The log is on the card, but not offered.
     let image = dir.path().join("card.img");
-    let info = hums(["info".as_ref(), image.as_os_str()]).expect_code(&[0, 3]).text();
+    let info = hums_with("info {}", &[&image]).expect_code(&[0, 3]).text();
     assert!(info.contains("00001_00.HUM"), "{info}");
 }
 
@@ -269,8 +268,7 @@ fn a_box_that_restarts_in_the_air_reads_no_parameters() {
     // Input while the power is off is lost.
     record(&["--reboot-at", "60"], &[3]);
     let out = dir.path().join("out");
-    let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), out.as_os_str()];
-    hums(command.into_iter().chain(["--format", "jsonl"].map(AsRef::as_ref))).expect_code(&[0, 3]);
+    hums_with("decode {} -o {} --format jsonl", &[&image, &out]).expect_code(&[0, 3]);
     let mut sessions: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).collect();
     sessions.sort();
     let is_set = |line: &&str| line.contains("HUMS_PARAM") && line.contains("\"changed\":true");
@@ -296,15 +294,7 @@ fn parameters_on_the_card_are_set_and_recorded_and_wrong_ones_are_told() {
     put_parameters(&image, &lines);
     record(&[0]);
     let out = dir.path().join("out");
-    hums([
-        "decode".as_ref(),
-        image.as_os_str(),
-        "-o".as_ref(),
-        out.as_os_str(),
-        "--format".as_ref(),
-        "jsonl".as_ref(),
-    ])
-    .expect_code(&[0]);
+    hums_with("decode {} -o {} --format jsonl", &[&image, &out]).expect_code(&[0]);
     let second = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).max().unwrap();
     let log = fs::read_to_string(second).unwrap();
     for (name, value) in [("BAT_REM_WARN", "31.0"), ("SIGN_PORT", "2.0"), ("CELL_VOLT_CRIT", "3.25")] {
@@ -377,7 +367,7 @@ fn card_with_a_log() -> (TempDir, Vec<u8>) {
     fs::write(dir.path().join("short.raw"), &recording[..80_000]).unwrap();
     fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
     let (input, image) = (dir.path().join("short.raw"), dir.path().join("card.img"));
-    hums(["sim".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()]).expect_code(&[0]);
+    hums_with("sim {} --sd {}", &[&input, &image]).expect_code(&[0]);
     let card = fs::read(&image).unwrap();
     (dir, card)
 }

@@ -9,7 +9,7 @@ use hums_blackbox::parity::COLUMNS;
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 use hums_tests::flights::own;
-use hums_tests::program::hums;
+use hums_tests::program::{hums, hums_with};
 use serde_json::Value;
 
 const FLIGHT: &str = "ap_quad_guided.tlog";
@@ -30,9 +30,7 @@ fn record_of(flight: &Path, image: &Path, cut: Option<u64>) -> Value {
 }
 
 fn verify(image: &Path, code: i32) -> Vec<Value> {
-    let text = hums(["info".as_ref(), "--verify".as_ref(), "--json".as_ref(), image.as_os_str()])
-        .expect_code(&[code])
-        .text();
+    let text = hums_with("info --verify --json {}", &[&image]).expect_code(&[code]).text();
     let all: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(all["ok"], code == 0, "{text}");
     all["logs"].as_array().unwrap().clone()
@@ -50,9 +48,9 @@ fn power_that_goes_after_the_disarming_leaves_a_log_that_is_whole_to_it() {
     let end = &logs[0]["end"];
     assert_eq!((&end["proof"], &end["mark"]["why"]), (&"mark".into(), &"disarmed".into()), "{end}");
     assert!(end["words"].as_str().unwrap().contains("whole to the disarming at 20"), "{end}");
-    let text = hums(["info".as_ref(), "--verify".as_ref(), image.as_os_str()]).expect_code(&[0]).text();
+    let text = hums_with("info --verify {}", &[&image]).expect_code(&[0]).text();
     assert!(text.contains("whose end cannot be proved") && !text.contains("everything holds"), "{text}");
-    let info = hums(["info".as_ref(), image.as_os_str()]).expect_code(&[0]).text();
+    let info = hums_with("info {}", &[&image]).expect_code(&[0]).text();
     assert!(info.contains("  end      whole to the disarming at"), "{info}");
 }
 
@@ -65,7 +63,7 @@ fn power_that_goes_in_flight_leaves_an_end_that_is_not_proved() {
     let end = &logs[0]["end"];
     assert_eq!(end["proof"], "none", "{end}");
     assert!(end["words"].as_str().unwrap().contains("armed or in the air since"), "{end}");
-    hums(["info".as_ref(), image.as_os_str()]).expect_code(&[3]);
+    hums_with("info {}", &[&image]).expect_code(&[3]);
 }
 
 #[test]
@@ -128,9 +126,7 @@ fn power_that_goes_after_a_landing_while_armed_leaves_a_log_that_is_whole_to_it_
     let cut = |at| {
         let _ = fs::remove_file(&image);
         let report = record_of(&flight, &image, at);
-        let text = hums(["info".as_ref(), "--verify".as_ref(), "--json".as_ref(), image.as_os_str()])
-            .expect_code(&[0, 3])
-            .text();
+        let text = hums_with("info --verify --json {}", &[&image]).expect_code(&[0, 3]).text();
         (report, serde_json::from_str::<Value>(&text).unwrap()["logs"][0]["end"].clone())
     };
     // The first write with the mark.
@@ -143,17 +139,9 @@ fn power_that_goes_after_a_landing_while_armed_leaves_a_log_that_is_whole_to_it_
     let (report, end) = cut(Some(with));
     assert_eq!(end["proof"], "mark", "{end}");
     assert!(end["words"].as_str().unwrap().contains("whole to the landing at "), "{end}");
-    hums(["info".as_ref(), "--verify".as_ref(), image.as_os_str()]).expect_code(&[0]);
+    hums_with("info --verify {}", &[&image]).expect_code(&[0]);
     // The input between mark and write.
-    let decode = [
-        "decode".as_ref(),
-        image.as_os_str(),
-        "-o".as_ref(),
-        "-".as_ref(),
-        "--format".as_ref(),
-        "jsonl".as_ref(),
-    ];
-    let rows = hums(decode).expect_code(&[0]).text();
+    let rows = hums_with("decode {} -o - --format jsonl", &[&image]).expect_code(&[0]).text();
     let mark = rows.lines().find(|row| row.contains("HUMS_MARK")).expect("a mark");
     let mark: Value = serde_json::from_str(mark).unwrap();
     let later = report["frames_in"].as_u64().unwrap() - mark["fields"]["frames"].as_u64().unwrap();

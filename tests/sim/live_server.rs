@@ -116,8 +116,7 @@ fn sigterm_ends_a_recording_as_ctrl_c_does_with_the_log_closed() {
     std::thread::sleep(Duration::from_secs(1));
     sim.signal("TERM");
     assert_eq!(sim.end(Duration::from_secs(20)), Some(0));
-    let json =
-        program::hums(["info".as_ref(), "--verify".as_ref(), "--json".as_ref(), image.as_os_str()]).text();
+    let json = program::hums_with("info --verify --json {}", &[&image]).text();
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["logs"][0]["closed"], true, "{json}");
 }

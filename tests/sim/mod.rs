@@ -15,7 +15,6 @@ mod memory;
 mod metadata;
 mod noise;
 mod persistence;
-mod power_cut;
 mod protection;
 mod pull;
 mod raw_device;

@@ -8,7 +8,7 @@ use hums_tests::child;
 use hums_tests::damage::Random;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::frames::build_v2;
-use hums_tests::program::{self, Machine, Recording, command, hums};
+use hums_tests::program::{self, Machine, Recording, command, hums, hums_with};
 use hums_tests::store::Stored;
 
 const FLIGHT: &str = "px4_hil_quad_low.tlog";
@@ -125,8 +125,7 @@ fn components_wear_from_flight_to_flight_until_they_are_due_and_info_says_so() {
     let mut seen = Vec::new();
     for _ in 0..3 {
         let recording = fly(&store, &["--params", file.to_str().unwrap()]).expect_code(&[0]);
-        let info =
-            hums(["info".as_ref(), recording.image().as_os_str(), "--json".as_ref()]).expect_code(&[0]);
+        let info = hums_with("info {} --json", &[&recording.image()]).expect_code(&[0]);
         let info: serde_json::Value = serde_json::from_str(&info.text()).unwrap();
         let components = info.to_string();
         let status = |place: u64| component_status(&info, place).unwrap_or_else(|| panic!("{components}"));
@@ -184,7 +183,7 @@ fn a_component_that_a_command_says_is_replaced_begins_anew_and_that_is_recorded(
     let fields = serde_json::from_str::<serde_json::Value>(replaced[0]).unwrap()["fields"].clone();
     assert_eq!(fields["flights"].as_f64(), Some(1.0), "what the old one had run: {fields}");
     let recording = run(["--seed".into(), "1".into()]);
-    let info = hums(["info".as_ref(), recording.image().as_os_str(), "--json".as_ref()]).expect_code(&[0]);
+    let info = hums_with("info {} --json", &[&recording.image()]).expect_code(&[0]);
     let info: serde_json::Value = serde_json::from_str(&info.text()).unwrap();
     let component = &info["logs"][0]["components"][0];
     assert_eq!(
@@ -231,6 +230,8 @@ fn a_parameter_file_that_is_wrong_is_told_with_line_and_range_and_leaves_nothing
         ("\nNO_SUCH 1\n", "line 2: there is no parameter NO_SUCH"),
         ("CELL_VOLT_WARN 3.6\nCELL_VOLT_CRIT,12\n", "line 2: CELL_VOLT_CRIT takes 0 to 4.5 V, not 12"),
         ("CELL_VOLT_WARN\n", "line 1: wants NAME VALUE"),
+        ("VIBE_WARN x\n", "line 1"),
+        ("VIBE_WARN 1 2\n", "line 1"),
     ] {
         fs::write(&file, text).unwrap();
         for flags in [&[][..], &["--firmware", "hums.elf"]] {

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use hums_tests::flights::own;
 use hums_tests::not_tested;
-use hums_tests::program::{Machine, Recording, hums};
+use hums_tests::program::{Machine, Recording, hums, hums_with};
 use serde_json::Value;
 
 /// Gone when dropped.
@@ -47,13 +47,12 @@ fn a_raw_device_is_read_like_its_image_by_each_command_and_never_written() {
     let out = tempfile::tempdir().unwrap();
     let decoded = |path: &Path, name: &str| {
         let to = out.path().join(name);
-        let words = ["decode".as_ref(), path.as_os_str(), "-o".as_ref(), to.as_os_str()];
-        hums(words.into_iter().chain(["--format", "tlog"].map(AsRef::as_ref))).expect_code(&[0]);
+        hums_with("decode {} -o {} --format tlog", &[&path, &to]).expect_code(&[0]);
         fs::read(to).unwrap()
     };
     assert!(decoded(&device.0, "device.tlog") == decoded(&image, "image.tlog"));
     let page = out.path().join("page.html");
-    hums(["report".as_ref(), device.0.as_os_str(), "-o".as_ref(), page.as_os_str()]).expect_code(&[0]);
+    hums_with("report {} -o {}", &[&device.0, &page]).expect_code(&[0]);
 
     let before = fs::read(&image).unwrap();
     let tlog = own("px4_hil_quad_low.tlog");

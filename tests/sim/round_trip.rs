@@ -1,12 +1,12 @@
 //! Every valid frame leaves the card bit for bit, in order, with its arrival time.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::Path;
 
-use hums_tests::flights::{Manifest, assert_found, own, stream};
+use hums_tests::child;
+use hums_tests::flights::{Manifest, OWN, assert_found, own, stream};
 use hums_tests::frames::{self, Frame, build_v2};
 use hums_tests::program::{self, Decoded, LIMIT, Machine, Recording};
-use hums_tests::{child, fat};
 
 #[track_caller]
 fn round_trip(path: &Path, manifest: &Manifest) {
@@ -54,24 +54,10 @@ fn assert_times_kept(input: &[Frame<'_>], output: &[Frame<'_>]) {
     }
 }
 
+/// Of both autopilots, one signed with boot text.
 #[test]
-fn an_ardupilot_flight_comes_out_bit_for_bit() {
-    round_trip(&own("ap_quad_guided.tlog"), Manifest::own());
-}
-
-#[test]
-fn a_signed_ardupilot_flight_with_boot_text_comes_out_bit_for_bit() {
-    round_trip(&own("ap_quad_signed.raw"), Manifest::own());
-}
-
-#[test]
-fn an_ardupilot_flight_with_faults_comes_out_bit_for_bit() {
-    round_trip(&own("ap_quad_faults.tlog"), Manifest::own());
-}
-
-#[test]
-fn a_px4_flight_comes_out_bit_for_bit() {
-    round_trip(&own("px4_hil_quad_low.tlog"), Manifest::own());
+fn each_flight_comes_out_bit_for_bit() {
+    OWN.map(own).iter().for_each(|path| round_trip(path, Manifest::own()));
 }
 
 #[cfg(feature = "oracle")]
@@ -90,7 +76,7 @@ fn every_further_recording_comes_out_bit_for_bit() {
 #[cfg(feature = "oracle")]
 #[test]
 fn the_manifest_is_what_pymavlink_finds() {
-    let files: Vec<_> = hums_tests::flights::OWN.into_iter().map(own).collect();
+    let files: Vec<_> = OWN.into_iter().map(own).collect();
     let text = hums_tests::oracle::manifest_text(&files);
     if std::env::var_os("HUMS_WRITE_DOCS").is_some() {
         fs::write(own("manifest.json"), &text).unwrap();
@@ -120,20 +106,6 @@ fn two_runs_are_the_same_to_the_byte_and_their_counters_add_up() {
 }
 
 #[test]
-fn a_recording_on_stdin_is_the_same_as_from_its_file() {
-    let flight = own("px4_hil_quad_low.tlog");
-    let dir = tempfile::tempdir().unwrap();
-    let image = dir.path().join("card.img");
-    let mut command = program::command(["sim", "-", "--speed", "max", "--sd"]);
-    let input = File::open(&flight).unwrap();
-    child::run_with_input(command.arg(&image), Some(input), LIMIT).expect_code(&[0]);
-    let seeds = &Manifest::own().seeds;
-    let (from_stdin, from_file) =
-        (Decoded::of(&image, &[0]), Recording::make(Machine::Sim, &flight, &[]).decode(&[0]));
-    assert_eq!(from_stdin.frames(seeds), from_file.frames(seeds));
-}
-
-#[test]
 fn a_second_flight_on_the_same_card_leaves_the_first_as_it_was() {
     let dir = tempfile::tempdir().unwrap();
     let image = dir.path().join("card.img");
@@ -149,18 +121,6 @@ fn a_second_flight_on_the_same_card_leaves_the_first_as_it_was() {
     assert_eq!(all.len() as u64, first.frames + second.frames);
     assert_found(first, &all[..first.frames as usize]);
     assert_found(second, &all[first.frames as usize..]);
-}
-
-#[test]
-fn the_files_that_another_computer_copies_off_the_card_are_the_same_log() {
-    let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &[]);
-    fat::assert_clean(&recording.image());
-    let dir = tempfile::tempdir().unwrap();
-    fat::copy_files(&recording.image(), dir.path());
-    let seeds = &Manifest::own().seeds;
-    let (copied, image) = (Decoded::of(dir.path(), &[0]), recording.decode(&[0]));
-    assert!(!copied.frames(seeds).is_empty());
-    assert_eq!(copied.frames(seeds), image.frames(seeds));
 }
 
 #[test]

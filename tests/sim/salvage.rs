@@ -7,7 +7,7 @@ use std::process::Command;
 
 use hums_tests::flights::{Manifest, OWN, own, stream};
 use hums_tests::frames::{self, Frame};
-use hums_tests::program::{Decoded, Machine, Recording, hums};
+use hums_tests::program::{Decoded, Machine, Recording, hums, hums_with};
 use serde_json::Value;
 
 const BLOCK: u64 = 512;
@@ -172,9 +172,7 @@ fn a_deleted_log_is_found_again() {
         assert_eq!(found["logs"].as_array().unwrap().len(), 2, "{name}: {found}");
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
-        let decode =
-            ["decode".as_ref(), image.as_os_str(), "--salvage".as_ref(), "-o".as_ref(), out.as_os_str()];
-        hums(decode.into_iter().chain(["--format".as_ref(), "tlog".as_ref()])).expect_code(&[0]);
+        hums_with("decode {} --salvage -o {} --format tlog", &[&image, &out]).expect_code(&[0]);
         let tlogs: Vec<_> =
             fs::read_dir(&out).unwrap().map(|file| fs::read(file.unwrap().path()).unwrap()).collect();
         let is_whole = |tlog: &Vec<u8>| {
@@ -218,9 +216,7 @@ fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_m
 
     // From the next group on; no damage of the card.
     let found = json("info", &image, &["--salvage"], 0);
-    let verify = hums(["info".as_ref(), "--verify".as_ref(), "--salvage".as_ref(), image.as_os_str()])
-        .expect_code(&[0])
-        .text();
+    let verify = hums_with("info --verify --salvage {}", &[&image]).expect_code(&[0]).text();
     assert!(
         verify.contains(
             "is in no file: it was deleted, its file lost its name, or newer sessions have written over it; "
@@ -234,9 +230,8 @@ fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_m
     assert_eq!((&gap["from_s"], &gap["cause"]), (&Value::Null, &"missing".into()), "its beginning");
     assert!(gap["to_s"].as_f64().unwrap() > 0.0 && gap["frames_missing"].as_u64().unwrap() > 0, "{gap}");
     let out = dir.path().join("out");
-    let decode = ["decode".as_ref(), image.as_os_str(), "--salvage".as_ref(), "-o".as_ref(), out.as_os_str()];
-    let told =
-        hums(decode.into_iter().chain(["--format".as_ref(), "tlog".as_ref()])).expect_code(&[0]).stderr;
+    let decoded = hums_with("decode {} --salvage -o {} --format tlog", &[&image, &out]);
+    let told = decoded.expect_code(&[0]).stderr;
     assert!(told.contains("is in no file: "), "{told}");
     let session = with_gaps[0]["name"].as_str().unwrap().strip_prefix("session-").unwrap();
     let files = fs::read_dir(&out).unwrap().map(|file| file.unwrap().path());
@@ -261,7 +256,7 @@ fn a_file_that_held_something_else_before_is_no_damage() {
     let mut content = fs::read(&image).unwrap();
     let noise = hums_tests::damage::Random::new(3).bytes(1 << 20);
     for (index, block) in content[data as usize + (64 << 10)..].chunks_exact_mut(512).enumerate() {
-        if block.iter().all(|byte| *byte == 0) {
+        if block == [0; 512] {
             let at = index * 512 % noise.len();
             block.copy_from_slice(&noise[at..at + 512]);
         }
@@ -288,6 +283,6 @@ fn a_damaged_sector_is_told_as_such_on_a_card_without_a_file_system_too() {
     let file = File::options().write(true).open(&image).unwrap();
     file.write_all_at(&[!block[100]], at * BLOCK + 100).unwrap();
     zero(&image, 0, BLOCK);
-    let text = hums(["info".as_ref(), image.as_os_str()]).expect_code(&[3]).text();
+    let text = hums_with("info {}", &[&image]).expect_code(&[3]).text();
     assert!(text.contains("1 damaged sector") && text.contains("sectors are damaged"), "{text}");
 }
