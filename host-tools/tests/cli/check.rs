@@ -9,7 +9,7 @@ use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 
 use super::support::{
-    attempt, end_of, flight, frames_of, hums, json, piped, px4, recorded, records, run, text,
+    attempt, end_of, flight, frames_of, hums, json, piped, px4, recorded, records, run, stderr, text,
 };
 
 /// Checks of the place on a link, which other recordings lack.
@@ -171,20 +171,6 @@ fn a_folder_gives_a_line_for_each_and_a_table_and_what_is_none_is_passed_over() 
 }
 
 #[test]
-fn what_is_no_recording_is_refused_with_what_would_be_one() {
-    let dir = tempfile::tempdir().expect("directory");
-    fs::write(dir.path().join("notes.txt"), "no recording").expect("a file");
-    fs::write(dir.path().join("empty.bin"), "").expect("a file");
-    for (input, why) in [("notes.txt", "nor a recording that this program knows"), ("empty.bin", "is empty")]
-    {
-        let output = run(dir.path(), &format!("check {input}"), 1);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(said.contains(why), "{said}");
-    }
-    run(dir.path(), "check", 2);
-}
-
-#[test]
 fn other_limits_give_other_findings() {
     let dir = recorded();
     fs::write(dir.path().join("strict.param"), "BAT_REM_WARN 90\n").expect("a file");
@@ -277,8 +263,7 @@ fn a_folder_says_how_many_of_its_files_are_no_log() {
     let dir = tempfile::tempdir().expect("directory");
     faults(dir.path());
     fs::write(dir.path().join("notes.txt"), "nothing of a vehicle").expect("written");
-    let output = run(dir.path(), "check .", 4);
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    let told = stderr(&run(dir.path(), "check .", 4));
     assert!(told.contains("1 file passed over: no log of a known kind\n  ./notes.txt\n"), "{told}");
 }
 
@@ -412,7 +397,7 @@ fn words_in_a_column_of_numbers_are_in_text_and_json_and_do_no_harm_in_columns()
 fn standard_input_is_read_once() {
     let dir = tempfile::tempdir().expect("directory");
     for command in ["check - -", "info - -", "decode - - -o out --format csv"] {
-        let told = String::from_utf8_lossy(&run(dir.path(), command, 2).stderr).into_owned();
+        let told = stderr(&run(dir.path(), command, 2));
         assert!(told.contains("standard input is named twice"), "{told}");
     }
     let bytes = fs::read(flight("px4_hil_quad_low.tlog")).expect("the recording");
@@ -506,8 +491,7 @@ fn what_a_logger_itself_lost_is_said_and_is_no_damage_to_any_command() {
     assert!(info.contains("1 place of loss or noise"), "{info}");
     run(dir.path(), "report drop.ulg -o page.html", 0);
     run(dir.path(), "check --system 1 drop.ulg", 2);
-    let output = run(dir.path(), "decode drop.ulg -o out --format csv", 0);
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    let told = stderr(&run(dir.path(), "decode drop.ulg -o out --format csv", 0));
     assert!(told.contains("1 place of loss or noise; hums check says what"), "{told}");
 }
 
@@ -521,7 +505,7 @@ fn what_is_read_by_other_programs_is_told_with_what_to_do() {
         (b"\xff\xfeF\0M\0T\0,\0", "UTF-16"),
     ] {
         fs::write(dir.path().join("x.bin"), start).expect("written");
-        let told = String::from_utf8_lossy(&run(dir.path(), "check x.bin", 1).stderr).into_owned();
+        let told = stderr(&run(dir.path(), "check x.bin", 1));
         assert!(told.contains("x.bin: is ") && told.contains(words), "{told}");
         assert_eq!(told.lines().count(), 1, "{told}");
     }
@@ -594,8 +578,7 @@ fn one_wrong_time_changes_no_other_time_of_what_is_packed() {
         with_times(&log, |index, us| if index == 999 { us ^ 1 << 36 } else { us }),
     )
     .expect("written");
-    let pack = run(dir.path(), "decode --format hum wrong.tlog -o wrong.hum", 3);
-    let told = String::from_utf8_lossy(&pack.stderr).into_owned();
+    let told = stderr(&run(dir.path(), "decode --format hum wrong.tlog -o wrong.hum", 3));
     assert!(told.contains("1 message with a wrong time"), "{told}");
     run(dir.path(), "decode --format hum faults.tlog -o faults.hum", 0);
     let info = |name: &str| json(&attempt(dir.path(), &format!("info --json {name}")))["logs"][0].clone();
@@ -678,8 +661,7 @@ fn a_packed_recording_has_the_times_the_damage_and_the_joints_that_check_sees() 
     let mut wrong = tlog.clone();
     wrong[8 + first - 1] ^= 1;
     write("wrong.tlog", &wrong);
-    let told = run(dir.path(), "decode --format hum wrong.tlog -o wrong.hum", 3);
-    let told = String::from_utf8_lossy(&told.stderr).into_owned();
+    let told = stderr(&run(dir.path(), "decode --format hum wrong.tlog -o wrong.hum", 3));
     assert!(told.contains("1 frame with a wrong checksum"), "{told}");
     let checked = json(&run(dir.path(), "check --json wrong.hum", 3));
     assert_eq!((&checked["loss_count"], &checked["damage_count"]), (&1.into(), &0.into()));
@@ -724,8 +706,7 @@ fn what_another_vehicle_flew_teaches_nothing_and_is_said() {
         end_of(name, dir.path());
     }
     let [ardupilot, px4] = names;
-    let said = run(dir.path(), &format!("check --past {ardupilot} --past {px4} {px4}"), 2);
-    let said = String::from_utf8_lossy(&said.stderr).into_owned();
+    let said = stderr(&run(dir.path(), &format!("check --past {ardupilot} --past {px4} {px4}"), 2));
     assert!(said.contains("name flights of one vehicle") && said.contains(px4), "{said}");
     let told = |past: &str| text(&attempt(dir.path(), &format!("check --past {past} {px4}")));
     let words = "trends are not judged: the flights of --past are of another vehicle (system 1, quadrotor";

@@ -11,7 +11,7 @@ use parquet::basic::Encoding::BYTE_STREAM_SPLIT;
 use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 
-use super::support::{contents, px4, run, text};
+use super::support::{contents, px4, run, stderr, text};
 
 fn rows(fleet: &Path) -> BTreeMap<String, Vec<String>> {
     let mut tables: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -89,8 +89,7 @@ fn other_files_stay_and_a_damaged_one_leaves_its_day_as_it_is() {
     let bytes = fs::read(at.join(&name)).expect("a file");
     fs::write(at.join(&name), &bytes[..bytes.len() / 2]).expect("written");
     let before = contents(&at);
-    let said = run(dir.path(), "compact fleet", 1);
-    let said = String::from_utf8_lossy(&said.stderr).into_owned();
+    let said = stderr(&run(dir.path(), "compact fleet", 1));
     assert!(
         said.contains("notes.txt: is not of hums") && said.contains("cannot be read as a table"),
         "{said}"

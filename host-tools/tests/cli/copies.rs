@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::copied::{BLOCK, all_say, copied, each_says, without};
-use crate::support::{attempt, run, text};
+use crate::support::{attempt, run, stderr, text};
 
 #[test]
 fn one_session_under_two_names_is_told_by_every_command_and_counted_once() {
@@ -74,7 +74,7 @@ fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alon
         let (tables, pages): (Vec<_>, Vec<_>) =
             lines.lines().partition(|line| line.contains("table of 2 pages"));
         assert_eq!((pages.len(), tables.len()), (2, 1), "{lines}");
-        let told = String::from_utf8_lossy(&said.stderr).into_owned();
+        let told = stderr(&said);
         assert!(told.contains("is a copy of copied/00001 (not counted)"), "{told}");
         let mut pages: Vec<String> = fs::read_dir(dir.path().join("pages"))
             .expect("pages")

@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::Command;
 
-use super::support::{attempt, contents, flight, json, recorded, records, run, text};
+use super::support::{attempt, contents, flight, json, recorded, records, run, stderr, text};
 
 #[test]
 fn a_manifest_names_each_file_with_its_hash() {
@@ -179,7 +179,7 @@ fn logs_without_an_id_are_of_the_vehicle_of_their_folder_or_of_the_one_that_is_n
     for input in ["empty", "nothere.tlog"] {
         for command in ["due", "check", "info --list"] {
             let said = run(dir.path(), &format!("{command} red {input} blue"), 1);
-            let told = String::from_utf8_lossy(&said.stderr).into_owned();
+            let told = stderr(&said);
             assert!(!text(&said).is_empty() && told.contains(&format!("{input}: ")), "{command}: {told}");
         }
     }

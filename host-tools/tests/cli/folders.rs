@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write as _;
 
 use crate::copied::{SEGMENT, all_say, copied, readers};
-use crate::support::{px4, run, text};
+use crate::support::{px4, run, stderr, text};
 
 #[test]
 fn a_copied_card_is_whole_and_each_file_that_holds_nothing_of_ours_is_told_by_every_command() {
@@ -52,8 +52,7 @@ fn a_recording_in_a_folder_that_holds_nothing_is_told() {
     fs::remove_file(path).expect("removed");
     fs::copy(px4(), dir.path().join("copied/flight.tlog")).expect("copied");
     fs::write(dir.path().join("copied/notes.txt"), "mine").expect("written");
-    let said = run(dir.path(), "info --verify copied", 0).stderr;
-    let said = String::from_utf8_lossy(&said);
+    let said = stderr(&run(dir.path(), "info --verify copied", 0));
     for words in ["1 recording of other kinds passed over", "1 file passed over: no log of a known kind"] {
         assert!(said.contains(words), "{said}");
     }
@@ -136,8 +135,7 @@ fn a_pipe_or_a_device_as_a_recording_is_refused_at_once_and_nothing_is_left() {
         "sim PX4 --sd pipe",
         "sim PX4 --sd new.img --store pipe",
     ] {
-        let said = run(dir.path(), line, 1);
-        let said = String::from_utf8_lossy(&said.stderr).into_owned();
+        let said = stderr(&run(dir.path(), line, 1));
         assert!(
             ["is a pipe", "is no file", "is not a file"].iter().any(|words| said.contains(words)),
             "{line}: {said}"

@@ -8,17 +8,13 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::Field;
 use tempfile::TempDir;
 
-fn flight(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name)
-}
+use super::support::{flight, named, run, stderr, text};
 
+/// What it prints, on both streams.
 #[track_caller]
 fn hums(dir: &Path, line: &str, code: i32) -> String {
-    let output =
-        super::support::hums().current_dir(dir).args(line.split_whitespace()).output().expect("it runs");
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(code), "hums {line}\n{error}");
-    String::from_utf8_lossy(&output.stdout).into_owned() + &error
+    let output = run(dir, line, code);
+    text(&output) + &stderr(&output)
 }
 
 fn read(path: &Path) -> SerializedFileReader<File> {
@@ -51,20 +47,6 @@ fn files(dir: &Path, ending: &str) -> BTreeMap<String, PathBuf> {
         }
     }
     found
-}
-
-fn named(dir: &Path, stem: &str) -> String {
-    let entries = fs::read_dir(dir).expect("a directory").map(|entry| entry.expect("an entry").file_name());
-    let mut names: Vec<String> = entries
-        .filter_map(|name| {
-            let name = name.into_string().expect("UTF-8");
-            let length = stem.len() + "-s1a2b3c4d".len();
-            name.starts_with(&format!("{stem}-s")).then(|| name[..length].to_owned())
-        })
-        .collect();
-    names.dedup();
-    assert_eq!(names.len(), 1, "{stem}: {names:?}");
-    names.remove(0)
 }
 
 fn shape(line: &str) -> String {
@@ -269,29 +251,6 @@ fn parquet_keeps_types_units_and_every_value() {
         let lines = fs::read_to_string(csv).expect("text").lines().count() as i64 - 1;
         assert!(parquet == lines || name == "STATUSTEXT", "{name}: {parquet} and {lines}");
     }
-}
-
-#[test]
-fn a_gap_is_in_every_format() {
-    let dir = packed(&["px4_hil_quad_low.tlog"]);
-    let path = dir.path().join("px4_hil_quad_low.hum");
-    let mut log = fs::read(&path).expect("a log");
-    log[150 * 512 + 100] ^= 0x04;
-    fs::write(&path, log).expect("written");
-    hums(dir.path(), "decode px4_hil_quad_low.hum -o out --format tlog,csv,jsonl,influx,parquet,thesis", 3);
-    let name = dir.path().join("out").join(named(&dir.path().join("out"), "px4_hil_quad_low"));
-    let read = |ending: &str| fs::read_to_string(format!("{}{ending}", name.display())).expect(ending);
-    let line = read("/HUMS_GAP.csv");
-    assert!(line.contains("damaged,1,"), "{line}");
-    assert_eq!(read(".tlog.gaps.csv").lines().count(), 2);
-    assert!(read(".jsonl").contains("\"HUMS_GAP\""));
-    assert!(read(".lp").lines().any(|line| line.starts_with("HUMS_GAP,")));
-    assert_eq!(read(".thesis/gaps.csv").lines().count(), 2);
-    assert!(files(&dir.path().join("out"), ".parquet").contains_key("HUMS_GAP"));
-    let values = read(".thesis/flightvalues.csv");
-    let seconds: Vec<u64> =
-        values.lines().skip(1).filter_map(|row| row.split_once('s')?.0.parse().ok()).collect();
-    assert!(seconds.windows(2).any(|pair| pair[1] > pair[0] + 1), "{seconds:?}");
 }
 
 #[test]

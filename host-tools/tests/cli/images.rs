@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::copied::{BLOCK, all_say, copied, readers};
-use crate::support::{json, px4, run, text};
+use crate::support::{json, px4, run, stderr, text};
 
 #[test]
 fn a_wiped_card_is_told_with_and_without_salvage() {
@@ -157,7 +157,6 @@ fn a_damaged_image_in_a_folder_is_read_as_where_it_is_named() {
     fs::write(cards.join("card.img"), &image[..300]).expect("written");
     fs::write(cards.join("notes.xyz"), "notes").expect("written");
     fs::copy(px4(), cards.join("flight.tlog")).expect("copied");
-    let said = run(dir.path(), "check cards", 3);
-    let said = String::from_utf8_lossy(&said.stderr).into_owned();
+    let said = stderr(&run(dir.path(), "check cards", 3));
     assert!(said.contains("has the name of a card's image") && said.contains("notes.xyz"), "{said}");
 }

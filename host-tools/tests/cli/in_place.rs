@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::support::{attempt, contents, flight, hums, json, piped, px4, recorded, run, text, until};
+use crate::support::{attempt, contents, flight, hums, json, piped, px4, recorded, run, stderr, text, until};
 
 fn is_begun(dir: &Path) -> bool {
     let mut names = fs::read_dir(dir).expect("a folder").map(|entry| entry.expect("an entry").file_name());
@@ -27,8 +27,7 @@ fn two_runs_do_not_use_one_card_or_one_store() {
     input.write_all(&tlog[..tlog.len() / 2]).expect("it reads");
     until("it records", || is_begun(dir.path()));
     for line in ["sim PX4 --sd card.img", "sim PX4 --sd new.img --store store"] {
-        let said = run(dir.path(), line, 1);
-        let said = String::from_utf8_lossy(&said.stderr);
+        let said = stderr(&run(dir.path(), line, 1));
         assert!(said.contains("another run of hums is using it; wait for its end"), "{said}");
     }
     drop(input);
@@ -65,8 +64,12 @@ fn what_has_no_frame_changes_neither_card_nor_store_and_a_compressed_recording_i
     write("text.gz", &packed(text.as_bytes()));
     write("log.bin", &[&[0xa3, 0x95, 128, 128, 89][..], b"FMT\0BBnNZ", &[0; 75]].concat());
     write("twice.gz", &packed(&packed(raw)));
+    write("empty", b"");
     let before = contents(dir.path());
     for (input, why) in [
+        ("missing", "missing: "),
+        ("empty", "empty: "),
+        (".", ""),
         ("text", "has no MAVLink frame, so nothing was written"),
         ("text.gz", "has no MAVLink frame"),
         ("log.bin", "is an ArduPilot log (DataFlash), which has no MAVLink frames"),
@@ -77,7 +80,7 @@ fn what_has_no_frame_changes_neither_card_nor_store_and_a_compressed_recording_i
         {
             let line = format!("sim {input} --sd {to}");
             let ended = piped(hums().current_dir(dir.path()).args(line.split(' ')), text.as_bytes());
-            let said = String::from_utf8_lossy(&ended.stderr);
+            let said = stderr(&ended);
             assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
             assert!(said.contains(why), "{line}: {said}");
         }
@@ -138,8 +141,7 @@ fn a_store_that_is_read_only_is_refused_as_an_image_is() {
     }
     let before = contents(dir.path());
     for line in ["sim PX4 --sd card.img", "sim PX4 --sd new.img --store store"] {
-        let said = run(dir.path(), line, 1);
-        let said = String::from_utf8_lossy(&said.stderr);
+        let said = stderr(&run(dir.path(), line, 1));
         assert!(said.contains(": is read-only; make it writable or name another"), "{line}: {said}");
     }
     assert!(contents(dir.path()) == before, "something was written");
@@ -161,8 +163,7 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
     run(dir.path(), "sim PX4 --sd card.img", 0);
     assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 2);
     fs::File::create(&image).and_then(|file| file.set_len(64 << 20)).expect("made");
-    let said = run(dir.path(), "sim PX4 --sd card.img", 3);
-    let said = String::from_utf8_lossy(&said.stderr);
+    let said = stderr(&run(dir.path(), "sim PX4 --sd card.img", 3));
     assert!(
         said.contains("the card has no partition table (MBR), so that nothing can be recorded on it"),
         "{said}"
@@ -177,8 +178,7 @@ fn a_store_beside_recordings_is_named_and_is_no_loss() {
     for line in
         ["info .", "check .", "info --list .", "info --verify .", "decode . -o out --format tlog --to 1"]
     {
-        let ended = run(dir.path(), line, 0);
-        let said = String::from_utf8_lossy(&ended.stderr);
+        let said = stderr(&run(dir.path(), line, 0));
         assert!(said.contains("store.bin: is the memory of a simulated board, and"), "{line}: {said}");
     }
     let said = run(dir.path(), "check store.bin", 1);
@@ -198,7 +198,7 @@ fn a_store_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
             format!("ulimit -f {kib}; exec {program} {}", line.replace("PX4", &px4().display().to_string()));
         let ended =
             Command::new("bash").args(["-c", &line]).current_dir(dir.path()).output().expect("it runs");
-        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        let said = stderr(&ended);
         assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
         said
     };
@@ -256,8 +256,7 @@ fn what_is_no_card_is_no_card_for_a_run_and_stays_as_it_is() {
         fs::write(at(name), bytes).expect("written");
         fs::File::options().write(true).open(at(name)).and_then(|file| file.set_len(40 << 20)).expect("room");
         let before = fs::read(at(name)).expect("there");
-        let said = run(dir.path(), &format!("sim PX4 --sd {name}"), 1);
-        let said = String::from_utf8_lossy(&said.stderr);
+        let said = stderr(&run(dir.path(), &format!("sim PX4 --sd {name}"), 1));
         assert!(said.contains(why) && said.contains("it stays. Name an image"), "{name}: {said}");
         assert!(fs::read(at(name)).expect("there") == before, "{name}");
     }
@@ -304,8 +303,7 @@ fn the_times_asked_for_are_those_that_the_tables_have_and_what_was_written_is_co
         text(&run(dir.path(), &line, 0)).lines().filter(|line| line.contains("\"ATT\"")).count()
     };
     assert_eq!([rows(""), rows("--from 305"), rows("--to 302"), rows("--from 302 --to 304")], [11, 6, 3, 3]);
-    let said = run(dir.path(), "decode late.log -o - --format jsonl --from 5000", 1);
-    let said = String::from_utf8_lossy(&said.stderr);
+    let said = stderr(&run(dir.path(), "decode late.log -o - --format jsonl --from 5000", 1));
     assert!(said.contains("its times go from 300.000 s to 310.000 s"), "{said}");
     let said = text(&run(dir.path(), "decode late.log -o out/ --format jsonl,csv --message ATT", 0));
     // With the row that names the recorder of the checks.

@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::{Arg, ArgAction, ArgGroup, CommandFactory as _};
 use hums::cli::Cli;
 
-use crate::support::{Stamp, attempt, contents, furnished, recorded, run, stamps, text};
+use crate::support::{Stamp, attempt, contents, furnished, recorded, run, stamps, stderr, text};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
@@ -155,14 +155,13 @@ fn no_command_writes_over_any_of_its_inputs() {
                     format!("link-{file}"),
                     format!("hard-{file}"),
                 ];
+                let of = |spelling| words(command, path, &[(input, file.to_owned()), (output, spelling)]);
+                for flag in flags(command) {
+                    let with = [of(file.to_owned()), vec![flag]].concat();
+                    refused(dir.path(), &with, said, &before);
+                }
                 for spelling in spellings {
-                    let given = [(input, file.to_owned()), (output, spelling)];
-                    let words = words(command, path, &given);
-                    refused(dir.path(), &words, said, &before);
-                    for flag in flags(command) {
-                        let with = [words.as_slice(), &[flag]].concat();
-                        refused(dir.path(), &with, said, &before);
-                    }
+                    refused(dir.path(), &of(spelling), said, &before);
                 }
                 if input.get_id() == "inputs" {
                     let given = [(input, "folder".to_owned()), (output, format!("folder/{file}"))];
@@ -190,7 +189,7 @@ fn a_page_that_would_go_into_an_input_is_refused_before_any_other_is_written() {
     let before = contents(dir.path());
     for flag in ["", "--force", "--compare"] {
         let ended = run(dir.path(), &format!("report log.hum -o pages {flag}"), 2);
-        let said = String::from_utf8_lossy(&ended.stderr);
+        let said = stderr(&ended);
         assert!(said.contains("index.html: is an input of this command"), "{said}");
         assert!(contents(dir.path()) == before && text(&ended).is_empty(), "{flag}: {said}");
     }
@@ -228,7 +227,7 @@ fn words_of(line: &str) -> Vec<String> {
 fn refused(dir: &Path, words: &[String], words_said: &str, before: &[(String, Stamp)]) {
     let line = words.join(" ");
     let output = attempt(dir, &line);
-    let said = String::from_utf8_lossy(&output.stderr);
+    let said = stderr(&output);
     assert!(matches!(output.status.code(), Some(1 | 2)), "hums {line}: {:?}\n{said}", output.status);
     let after = stamps(dir);
     for file in before {

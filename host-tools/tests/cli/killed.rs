@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use crate::support::{
-    all_named, attempt, contents, flight, frames_of, furnished, json, named, px4, run, until,
+    all_named, attempt, contents, flight, frames_of, furnished, json, named, px4, run, stderr, until,
 };
 
 fn parts(dir: &Path) -> Vec<String> {
@@ -63,8 +63,7 @@ fn what_is_written_beside_a_recording_may_fail_and_the_recording_goes_on() {
     let dir = tempfile::tempdir().expect("directory");
     let frames =
         |image: &str| json(&run(dir.path(), &format!("info {image} --json"), 0))["logs"][0]["frames"].clone();
-    let said = run(dir.path(), "sim PX4 --sd full.img --gs /dev/full --tap /dev/full", 3);
-    let said = String::from_utf8_lossy(&said.stderr);
+    let said = stderr(&run(dir.path(), "sim PX4 --sd full.img --gs /dev/full --tap /dev/full", 3));
     for flag in ["--gs", "--tap"] {
         let words = format!("{flag}: /dev/full: cannot be written");
         assert_eq!(said.matches(&words).count(), 1, "{said}");
@@ -196,8 +195,7 @@ fn what_is_not_whole_in_a_folder_is_passed_over_and_told() {
     for line in
         ["info --verify IN", "info IN", "check IN", "report IN -o pages/", "decode IN -o out/ --format tlog"]
     {
-        let said = run(dir.path(), &line.replace("IN", "folder"), 0);
-        let said = String::from_utf8_lossy(&said.stderr);
+        let said = stderr(&run(dir.path(), &line.replace("IN", "folder"), 0));
         assert_eq!(said.matches("has not ended, and is passed over").count(), 3, "{line}: {said}");
     }
     assert_eq!(all_named(&dir.path().join("out"), "00001").len(), 1);

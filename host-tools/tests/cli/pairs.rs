@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use super::support::{json, run, text};
+use super::support::{json, run, stderr, text};
 
 fn labelled(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/labelled").join(name)
@@ -88,8 +88,7 @@ fn a_damaged_log_of_an_autopilot_is_read_around_the_damage_which_is_told_with_it
     fs::copy(labelled("bin/f12_gps_jump.bin.gz"), dir.path().join("whole.bin.gz")).expect("a copy");
     fs::copy(labelled("f12_gps_jump.tlog.gz"), dir.path().join("other.tlog.gz")).expect("a copy");
     for _ in 0..2 {
-        let said = run(dir.path(), "decode whole.bin.gz other.tlog.gz -o again --format parquet", 0).stderr;
-        let said = String::from_utf8_lossy(&said).into_owned();
+        let said = stderr(&run(dir.path(), "decode whole.bin.gz other.tlog.gz -o again --format parquet", 0));
         assert!(!said.contains("of loss"), "a skipped log has what it had: {said}");
     }
 }

@@ -9,7 +9,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use crate::support::{
-    attempt, contents, flight, frames, frames_of, hums, json, named, px4, recorded, run, text,
+    attempt, contents, flight, frames_of, hums, json, named, px4, recorded, records, run, stderr, text,
 };
 
 fn packed(dir: &Path) {
@@ -97,14 +97,7 @@ fn recorded_times_come_back_to_the_millisecond() {
     packed(dir.path());
     run(dir.path(), "decode flight.hum -o back.tlog --format tlog", 0);
     let times = |path: &Path| -> Vec<u64> {
-        let bytes = fs::read(path).expect("a tlog");
-        let mut at = 0;
-        let mut times = Vec::new();
-        for frame in frames(&bytes) {
-            times.push(u64::from_be_bytes(bytes[at..at + 8].try_into().expect("eight")));
-            at += 8 + frame.len();
-        }
-        times
+        records(&fs::read(path).expect("a tlog")).into_iter().map(|(us, _)| us).collect()
     };
     let (before, after) = (times(&px4()), times(&dir.path().join("back.tlog")));
     assert!(before.iter().zip(&after).all(|(before, after)| before.abs_diff(*after) < 1000));
@@ -311,18 +304,6 @@ fn a_cut_log_gives_what_it_has() {
 }
 
 #[test]
-fn a_card_without_its_file_system_is_read_block_by_block() {
-    let dir = recorded();
-    let path = dir.path().join("card.img");
-    let mut image = fs::read(&path).expect("an image");
-    let end = image.windows(3).position(|bytes| bytes == b"HUM").expect("a directory entry") + 512;
-    image[..end / 512 * 512].fill(0);
-    fs::write(&path, &image).expect("written");
-    run(dir.path(), "decode card.img -o back.tlog --format tlog", 3);
-    assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&px4()));
-}
-
-#[test]
 fn segments_copied_off_a_card_are_a_log() {
     let dir = recorded();
     let image = fs::read(dir.path().join("card.img")).expect("an image");
@@ -358,8 +339,7 @@ fn what_is_no_log_is_told_apart() {
     // As large as a possible card without a partition table.
     fs::write(at.join("large"), [&dataflash[..], &vec![b'\n'; 3 << 20]].concat()).expect("written");
     for input in ["ArduPilot", "ULog", "large", "PX4"] {
-        let output = run(at, &format!("info --verify {input}"), 1);
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        let error = stderr(&run(at, &format!("info --verify {input}"), 1));
         assert!(error.contains("not a log of HUMS; `hums check` judges it"), "{input}: {error}");
     }
     for (input, said) in [
@@ -370,13 +350,12 @@ fn what_is_no_log_is_told_apart() {
         ("missing", "cannot be read"),
         ("PX4", "hums decode --format hum"),
     ] {
-        for command in ["info", "info --verify", "decode -o out --format csv"] {
+        for command in ["info", "info --verify", "decode -o out --format csv", "check"] {
             if input == "PX4" && command != "info --verify" {
                 run(at, &format!("{command} {input}"), 0);
                 continue;
             }
-            let output = run(at, &format!("{command} {input}"), 1);
-            let error = String::from_utf8_lossy(&output.stderr).into_owned();
+            let error = stderr(&run(at, &format!("{command} {input}"), 1));
             assert!(error.contains(said), "{command} {input}: {error}");
             let lists = command == "info --verify"
                 || input != "zeros"
@@ -416,12 +395,17 @@ fn slips_of_the_command_line_are_usage_errors() {
         "sim udp:1.2.3.4:5 --sd c.img",
         "sim PX4 --sd c.img --stall 5",
         "sim PX4 --sd c.img --noise 2",
+        "sim PX4 --sd c.img --noise often",
+        "sim PX4 --sd c.img --speed fast",
         "sim PX4 --sd c.img --card-size 5",
         "sim PX4 --sd c.img --gs - --json",
         "sim udpin:127.0.0.1:1 --sd c.img --speed max",
         "sim --firmware x.elf PX4 --sd c.img --card-out 1..2",
         "sim PX4 --sd c.img --costs",
+        "check",
+        "decode PX4",
         "decode c.img -o out --format xml",
+        "info",
         "decode --format hum,tlog PX4 -o out",
         "decode --format hum PX4 -o out.hum --from 1",
     ] {

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use crate::inputs::{leaves, value, words};
 use crate::support::{
-    all_named, attempt, contents, end_of, flight, frames_of, furnished, named, px4, run, stamps, text,
+    all_named, attempt, contents, end_of, flight, frames_of, furnished, named, px4, run, stamps, stderr, text,
 };
 
 fn two_cards() -> TempDir {
@@ -88,7 +88,7 @@ fn an_output_that_exists_is_overwritten_with_force_only_by_every_format() {
         run(dir.path(), &line("whole", ""), 0);
         let made = contents(&out);
         let refused = |line: &str| {
-            let said = String::from_utf8_lossy(&run(dir.path(), line, 1).stderr).into_owned();
+            let said = stderr(&run(dir.path(), line, 1));
             assert!(said.contains("exists, and was not overwritten") && said.contains("--force"), "{said}");
             assert!(contents(&out) == made, "{line} changed something");
         };
@@ -236,7 +236,7 @@ fn a_skipped_log_counts_as_the_written_one() {
     fs::write(dir.path().join("logs/noisy.tlog"), [first, &[0x55; 3000], last].concat()).expect("written");
     let decode = |manifest: &str| {
         let line = format!("decode logs -o out --format jsonl --manifest {manifest}");
-        let said = String::from_utf8_lossy(&run(dir.path(), &line, 3).stderr).into_owned();
+        let said = stderr(&run(dir.path(), &line, 3));
         let made = fs::read(dir.path().join(manifest)).expect("a manifest");
         let made: serde_json::Value = serde_json::from_slice(&made).expect("JSON");
         let logs = made["logs"].as_array().expect("logs").clone();
@@ -256,8 +256,7 @@ fn a_skipped_log_proves_the_end_of_the_log_before() {
     }
     run(dir.path(), "decode card.img -o all --format tlog", 0);
     run(dir.path(), "decode card.img --session 00002 -o out/ --format tlog", 0);
-    let said = run(dir.path(), "decode card.img -o out --format tlog", 0);
-    let said = String::from_utf8_lossy(&said.stderr);
+    let said = stderr(&run(dir.path(), "decode card.img -o out --format tlog", 0));
     assert_eq!(said.matches("skipped: ").count(), 1, "{said}");
 }
 
@@ -267,8 +266,7 @@ fn a_log_with_some_of_its_outputs_is_not_skipped() {
     run(dir.path(), "decode c1.img c2.img -o out --format tlog", 0);
     let before = contents(&dir.path().join("out"));
     for format in ["tlog,csv", "tlog,parquet", "jsonl,tlog"] {
-        let said = run(dir.path(), &format!("decode c1.img c2.img -o out --format {format}"), 1);
-        let said = String::from_utf8_lossy(&said.stderr);
+        let said = stderr(&run(dir.path(), &format!("decode c1.img c2.img -o out --format {format}"), 1));
         assert!(said.contains("other outputs of this log are missing"), "{format}: {said}");
     }
     let tables = |(name, _): &(String, Vec<u8>)| !name.ends_with("lock");
@@ -285,7 +283,7 @@ fn a_time_in_which_there_is_nothing_is_told_and_nothing_is_written() {
     for (output, format) in [("out", "csv,tlog,parquet,thesis"), ("out.tlog", "tlog"), ("-", "jsonl")] {
         let line = format!("decode log.hum -o {output} --format {format} --from 99999");
         let output = run(dir.path(), &line, 1);
-        let said = String::from_utf8_lossy(&output.stderr);
+        let said = stderr(&output);
         assert!(
             said.contains("log: nothing of it is within --from and --to: its times go from 0.000 s to "),
             "{said}"
@@ -301,8 +299,7 @@ fn a_message_that_is_not_there_is_told_and_makes_no_empty_tlog() {
     let dir = tempfile::tempdir().expect("directory");
     run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     for line in ["decode log.hum -o out.tlog --format tlog", "decode PX4 -o out.jsonl --format jsonl"] {
-        let said = run(dir.path(), &format!("{line} --message AIRSPEED_AUTOCAL"), 1);
-        let said = String::from_utf8_lossy(&said.stderr);
+        let said = stderr(&run(dir.path(), &format!("{line} --message AIRSPEED_AUTOCAL"), 1));
         assert!(
             said.contains(": no AIRSPEED_AUTOCAL is in it") && said.contains("nothing was written"),
             "{said}"
@@ -328,7 +325,7 @@ fn tables_that_would_lie_below_a_file_are_refused_in_every_format() {
     for (output, format) in [("notes.txt/", "csv"), ("notes.txt/", "parquet"), ("fleet", "parquet")] {
         let ended =
             attempt(dir.path(), &format!("decode log.hum -o {output} --format {format} --vehicle quad-7"));
-        let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+        let told = stderr(&ended);
         assert_eq!(ended.status.code(), Some(1), "{output} {format}: {told}");
         assert!(told.contains("is a file, and a directory is needed there"), "{output} {format}: {told}");
     }
@@ -369,7 +366,7 @@ fn recordings_are_once_in_a_fleet_however_often_their_folders_are_decoded() {
         ["quad/a.tlog", "quad/b.tlog", "hexa/a.tlog", "quad/c.raw", "spare/again.tlog", "spare/b.tlog.gz"];
     let decode = |inputs: &str, more: &str| {
         let ended = attempt(dir.path(), &format!("decode {inputs} -o fleet --format parquet {more}"));
-        let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+        let told = stderr(&ended);
         (ended.status.code(), told)
     };
     let mut known = Vec::new();
@@ -431,7 +428,7 @@ fn pages_that_exist_are_skipped_and_the_others_are_written() {
     let report = |more: &str| {
         let ended = attempt(dir.path(), &format!("report logs -o pages/ --json {more}"));
         assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
-        let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+        let told = stderr(&ended);
         let made = crate::support::json(&ended);
         let count = |name: &str| made[name].as_array().expect("a list").len();
         (count("pages"), count("skipped"), told.matches(": skipped: ").count())

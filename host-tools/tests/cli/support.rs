@@ -65,7 +65,7 @@ pub(crate) fn piped(command: &mut Command, input: &[u8]) -> Output {
 #[track_caller]
 pub(crate) fn run(dir: &Path, line: &str, code: i32) -> Output {
     let output = attempt(dir, line);
-    let error = String::from_utf8_lossy(&output.stderr);
+    let error = stderr(&output);
     assert_eq!(output.status.code(), Some(code), "hums {line}\n{error}");
     output
 }
@@ -87,13 +87,17 @@ pub(crate) fn text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
+pub(crate) fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
 pub(crate) fn json(output: &Output) -> serde_json::Value {
     serde_json::from_slice(&output.stdout).expect("one JSON object")
 }
 
 pub(crate) fn recorded() -> TempDir {
     made_once("recorded", |dir| {
-        run(dir, "sim PX4 --sd card.img", 0);
+        run(dir, "sim PX4 --sd card.img --card-size 64", 0);
     })
 }
 
@@ -109,7 +113,7 @@ impl Made {
     fn of((name, bytes): (String, Vec<u8>)) -> Self {
         const PART: usize = 4_096;
         let parts = (0..).step_by(PART).zip(bytes.chunks(PART));
-        let parts = parts.filter(|(_, part)| part.iter().any(|byte| *byte != 0));
+        let parts = parts.filter(|(_, part)| **part != [0; PART][..part.len()]);
         Self { name, long: bytes.len() as u64, parts: parts.map(|(at, part)| (at, part.to_vec())).collect() }
     }
 
@@ -140,18 +144,7 @@ pub(crate) fn made_once(what: &str, make: impl FnOnce(&Path)) -> TempDir {
 }
 
 pub(crate) fn frames(tlog: &[u8]) -> Vec<Vec<u8>> {
-    let mut frames = Vec::new();
-    let mut at = 0;
-    while let Some(rest) = tlog.get(at + 8..).filter(|rest| rest.len() > 3) {
-        let length = match rest[0] {
-            0xfe => usize::from(rest[1]) + 8,
-            0xfd => usize::from(rest[1]) + 12 + if rest[2] & 1 == 0 { 0 } else { 13 },
-            other => panic!("no frame at byte {at}: {other:#x}"),
-        };
-        frames.push(rest[..length].to_vec());
-        at += 8 + length;
-    }
-    frames
+    records(tlog).into_iter().map(|(_, frame)| frame.to_vec()).collect()
 }
 
 pub(crate) fn frames_of(path: &Path) -> Vec<Vec<u8>> {
