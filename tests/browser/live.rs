@@ -14,11 +14,7 @@ use hums_tests::oracle::LivePage;
 use hums_tests::program::{command, hums, hums_with};
 use serde_json::{Value, json};
 
-fn number(text: &str) -> f64 {
-    let plain: String =
-        text.chars().filter(|c| *c != '\u{202f}').map(|c| if c == '\u{2212}' { '-' } else { c }).collect();
-    plain.parse().unwrap_or_else(|_| panic!("no number: {text:?}"))
-}
+use super::report::number;
 
 fn shown(page: &Value, name: &str) -> f64 {
     number(page["values"][name].as_str().unwrap_or_else(|| panic!("the page has no {name}")))

@@ -41,7 +41,8 @@ fn assert_sound(shown: &Value) {
     }
 }
 
-fn number(text: &str) -> f64 {
+/// What a text begins with.
+pub(crate) fn number(text: &str) -> f64 {
     let plain: String =
         text.chars().filter(|c| *c != '\u{202f}').map(|c| if c == '\u{2212}' { '-' } else { c }).collect();
     let end = plain.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '-'))).unwrap_or(plain.len());

@@ -181,36 +181,25 @@ fn other_limits_give_other_findings() {
 }
 
 #[test]
-fn a_packed_recording_is_checked_by_everything_that_shows_findings() {
+fn a_recording_and_its_pack_are_a_summary_and_a_page_with_what_is_found() {
     let dir = tempfile::tempdir().expect("directory");
     faults(dir.path());
     run(dir.path(), "decode --format hum faults.tlog -o packed.hum", 0);
-    let info = json(&run(dir.path(), "info --json packed.hum", 0));
-    assert_eq!(info["logs"][0]["checked_by"].as_str(), Some("hums"));
-    assert!(info["logs"][0]["findings_count"].as_u64().expect("a number") > 3);
-    assert!(
-        text(&run(dir.path(), "info packed.hum", 0))
-            .contains("checked here: what recorded this ran no checks")
-    );
-    run(dir.path(), "report packed.hum -o page.html", 0);
-    let page = fs::read_to_string(dir.path().join("page.html")).expect("the page");
-    assert!(page.contains("\"checked_by\":\"hums\"") && page.contains("\"check\":\"cell_voltage\""));
-}
-
-#[test]
-fn an_old_recording_is_a_page_and_a_summary_without_a_card_between() {
-    let dir = tempfile::tempdir().expect("directory");
-    faults(dir.path());
-    let info = json(&run(dir.path(), "info --json faults.tlog", 0));
-    let log = &info["logs"][0];
-    assert_eq!((log["format"].as_str(), log["frames"].as_u64()), (Some("tlog"), Some(77_633)));
-    assert!(log["usage"]["flight_time_s"].as_f64().is_some_and(|seconds| (300.0..310.0).contains(&seconds)));
-    assert_eq!(log["messages"][0]["name"].as_str(), Some("HEARTBEAT"));
-    assert!(text(&run(dir.path(), "info faults.tlog", 0)).contains("ground station's log (tlog)"));
-    run(dir.path(), "report faults.tlog -o page.html", 0);
-    let page = fs::read_to_string(dir.path().join("page.html")).expect("the page");
-    for words in ["\"format\":\"tlog\"", "\"check\":\"cell_voltage\"", "Battery 1 is low"] {
-        assert!(page.contains(words), "{words}");
+    for (input, format, words) in [
+        ("faults.tlog", "tlog", "ground station's log (tlog)"),
+        ("packed.hum", "hums", "checked here: what recorded this ran no checks"),
+    ] {
+        let log = json(&run(dir.path(), &format!("info --json {input}"), 0))["logs"][0].clone();
+        assert_eq!((log["format"].as_str(), log["checked_by"].as_str()), (Some(format), Some("hums")));
+        assert_eq!((&log["frames"], &log["messages"][0]["name"]), (&77_633.into(), &"HEARTBEAT".into()));
+        let flight_s = log["usage"]["flight_time_s"].as_f64().expect("seconds");
+        assert!((300.0..310.0).contains(&flight_s) && log["findings_count"].as_u64() > Some(3), "{log}");
+        assert!(text(&run(dir.path(), &format!("info {input}"), 0)).contains(words), "{input}");
+        run(dir.path(), &format!("report {input} -o {input}.html"), 0);
+        let page = fs::read_to_string(dir.path().join(format!("{input}.html"))).expect("the page");
+        for words in ["\"checked_by\":\"hums\"", "\"check\":\"cell_voltage\"", "Battery 1 is low"] {
+            assert!(page.contains(words), "{input}: {words}");
+        }
     }
     run(dir.path(), "report faults.tlog -o pages/", 0);
     let pages = fs::read_dir(dir.path().join("pages")).expect("a directory");
