@@ -62,9 +62,10 @@ impl Coverage {
                 (check.read)(&inputs, instance).is_some_and(|reading| reading.value.is_finite())
             });
         }
-        for (check, ..) in monitor.health().levels().filter(|(.., level)| *level != Level::Stale) {
-            let place = checks().position(|known| known.name == check.name);
-            if let Some(seen) = place.and_then(|place| self.seen.get_mut(place)) {
+        // In the order of the checks.
+        let mut levels = monitor.health().levels().filter(|(.., level)| *level != Level::Stale).peekable();
+        for (seen, check) in self.seen.iter_mut().zip(checks()) {
+            while levels.next_if(|(of, ..)| of.name == check.name).is_some() {
                 seen.level = true;
             }
         }
