@@ -109,8 +109,7 @@ impl Journey {
 
     /// What the file cannot hold of this log, as sentences; `name` is the format's.
     pub(crate) fn remarks(&self, name: &str) -> Vec<String> {
-        let mut remarks =
-            vec![format!("{name} has the track and the findings; other messages are not in it")];
+        let mut remarks = Vec::new();
         if self.fixes == 0 {
             remarks.push(format!("no position is in the log, so the {name} has no track"));
         }

@@ -1,6 +1,6 @@
 //! Place, attitude and motion of the vehicle, from its observations: for formats that draw a track.
 
-use hums_core::observation::{Attitude, Observation};
+use hums_core::observation::{Attitude, Battery, Observation, SystemStatus};
 use hums_core::units::Position;
 use hums_core::vehicle::Vehicle;
 
@@ -54,6 +54,19 @@ impl Motion {
             }
             Observation::Gnss(gnss) if gnss.instance == 0 && self.vehicle.global.get().is_none() => {
                 Some(of(gnss.position?, gnss.altitude?.0, None))
+            }
+            _ => None,
+        }
+    }
+
+    /// The battery of an observation: the autopilot's own figures are the first battery's while none reports itself.
+    pub(crate) fn battery_by(&self, observation: &Observation) -> Option<Battery> {
+        match observation {
+            Observation::Battery(battery) => Some(*battery),
+            &Observation::SystemStatus(SystemStatus { voltage, current, remaining, .. }) => {
+                let is_alone = self.vehicle.batteries.iter().all(|slot| slot.get().is_none());
+                let battery = Battery { voltage, current, remaining, ..Battery::default() };
+                voltage.filter(|_| is_alone).map(|_| battery)
             }
             _ => None,
         }

@@ -69,12 +69,14 @@ impl Row {
     }
 }
 
-/// A column's name without brackets, and its unit: `at[s]`, which would need quoting in every query, is `at_s`.
+/// A column's name without brackets, and its unit: `at[s]`, which would need quoting in every query, is `at_s`,
+/// and so is `at_s[s]`.
 pub fn plain_name(name: &'static str) -> (String, &'static str) {
     let (plain, units) = name.strip_suffix(']').and_then(|name| name.rsplit_once('[')).unwrap_or((name, ""));
     // An element of an array: `q[0]`.
     let (plain, units) = if units.parse::<u32>().is_ok() { (name, "") } else { (plain, units) };
-    let plain = if units.is_empty() { plain.to_owned() } else { format!("{plain}_{units}") };
+    let is_told = units.is_empty() || plain.to_lowercase().ends_with(&format!("_{}", units.to_lowercase()));
+    let plain = if is_told { plain.to_owned() } else { format!("{plain}_{units}") };
     (plain.replace('%', "percent"), units)
 }
 

@@ -20,7 +20,8 @@ const HEAD: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
     <kml xmlns=\"http://www.opengis.net/kml/2.2\" xmlns:gx=\"http://www.google.com/kml/ext/2.2\">\n<Document>\n";
 const STYLES: &str = "<Style id=\"track\"><LineStyle><color>ffff9000</color><width>3</width></LineStyle></Style>\n\
     <Style id=\"critical\"><IconStyle><color>ff0000ff</color></IconStyle></Style>\n\
-    <Style id=\"warning\"><IconStyle><color>ff00d7ff</color></IconStyle></Style>\n";
+    <Style id=\"warning\"><IconStyle><color>ff00d7ff</color></IconStyle></Style>\n\
+    <Style id=\"advisory\"/><Style id=\"stale\"/><Style id=\"ok\"/>\n";
 
 /// The open file.
 pub(super) struct Kml {

@@ -275,6 +275,10 @@ impl Ulog {
 
     fn observe(&mut self, at: Instant, utc_us: Option<u64>, observation: &Observation) -> Result<()> {
         let mut fields = Fields::default();
+        if let Some(battery) = self.motion.battery_by(observation) {
+            fields.battery(&battery);
+            self.put((Topic::Battery, battery.id), at, &std::mem::take(&mut fields))?;
+        }
         let topic = match observation {
             Observation::Attitude(attitude) => {
                 if let Some(rates) = attitude.rates {
@@ -302,10 +306,6 @@ impl Ulog {
             Observation::Gnss(gnss) => {
                 fields.gnss(gnss, utc_us);
                 (Topic::Gnss, gnss.instance)
-            }
-            Observation::Battery(battery) => {
-                fields.battery(battery);
-                (Topic::Battery, battery.id)
             }
             Observation::Heartbeat(heartbeat) => {
                 fields.status(heartbeat, self.motion.vehicle());
@@ -376,7 +376,6 @@ impl Ulog {
             |key: &str, text: &str| keyed(b'I', &format!("char[{}] {key}", text.len()), text.as_bytes());
         out.extend(text("sys_name", autopilot));
         out.extend(text("ver_hw", "unknown"));
-        out.extend(text("ver_sw", concat!("hums ", env!("CARGO_PKG_VERSION"))));
         if let Some(identity) = vehicle.identity.get() {
             out.extend(keyed(b'I', "uint32_t ver_sw_release", &identity.firmware.to_le_bytes()));
             if identity.uid != 0 {
@@ -468,12 +467,9 @@ impl Writer for Ulog {
         self.file.write(&head)?;
         self.data.copy(&mut self.file)?;
         let counts = [(self.messages, "message"), (self.parameters.len() as u64, "parameter")];
-        let mut remarks = vec![
-            "ulog has the main quantities, texts and parameters; other messages are not in it".to_owned(),
-        ];
-        if self.parameters_left_out > 0 {
-            remarks.push(format!("{} left out", count(self.parameters_left_out, "report of a parameter")));
-        }
-        Ok(Finished { made: vec![OutputFile::of(self.file.finish()?, "ulog", &counts)], remarks })
+        let left_out = (self.parameters_left_out > 0)
+            .then(|| format!("{} left out", count(self.parameters_left_out, "report of a parameter")));
+        let made = vec![OutputFile::of(self.file.finish()?, "ulog", &counts)];
+        Ok(Finished { made, remarks: left_out.into_iter().collect() })
     }
 }

@@ -182,7 +182,7 @@ fn cells(entry: &LogbookEntry, sum: Life) -> [String; COLUMNS.len()] {
         entry.firmware.clone(),
         text(&entry.take_off),
         text(&entry.landing),
-        number(Some(entry.duration_s), 1),
+        number(Some(entry.duration_s), 3),
         number(entry.from.map(|spot| spot.latitude_deg), 7),
         number(entry.from.map(|spot| spot.longitude_deg), 7),
         number(entry.to.map(|spot| spot.latitude_deg), 7),

@@ -59,7 +59,7 @@ fn exchange(entry: &LogbookEntry, known: &Preview) -> Option<Value> {
     let about = &known.about;
     let Way { features, items, events } = way(entry, known, (from, to), start_us);
     let overview = &about.overview;
-    let serial = known.identity.vehicle.strip_prefix("uid-").unwrap_or(&known.identity.vehicle);
+    let serial = known.identity.vehicle.strip_prefix("uid-").unwrap_or_default();
     let by_hand = |name: &str| entry.by_hand.get(name).cloned().unwrap_or_default();
     let end_us = overview.ending.summary.last.and_then(|last| epochs.utc_us(last)).unwrap_or(start_us);
     Some(json!({"exchange": {

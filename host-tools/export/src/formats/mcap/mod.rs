@@ -240,7 +240,10 @@ impl Mcap {
                     });
                 });
             }
-            Observation::Battery(battery) => messages.add(Topic::Battery(battery.id), time_ns, |out| {
+            _ => {}
+        }
+        if let Some(battery) = self.motion.battery_by(observation) {
+            messages.add(Topic::Battery(battery.id), time_ns, |out| {
                 timestamp(out, 1, time_ns);
                 let values = [
                     battery.voltage.map(|value| value.0),
@@ -255,8 +258,7 @@ impl Mcap {
                 inside(out, 7, |out| {
                     cells.for_each(|cell| out.extend_from_slice(&cell.volts().0.to_le_bytes()));
                 });
-            }),
-            _ => {}
+            });
         }
     }
 
