@@ -146,17 +146,14 @@ fn a_log_of_many_unknown_ids_takes_little_memory_and_few_files() {
     assert_all_bounded(&ids, most);
     let out = dir.path().join("tables");
     let words = ["decode", ids.to_str().unwrap(), "--format", "csv", "-o", out.to_str().unwrap()];
-    let said = run(&words).text();
-    assert!(said.contains("UNKNOWN.csv"), "{said}");
+    run(&words);
     let folder = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).find(|path| path.is_dir());
     let folder = folder.unwrap_or(out);
     let files: Vec<_> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert!((512..600).contains(&files.len()), "{} files", files.len());
-    // Each frame is in one table: the first 512 ids in their own, the others in order with their ids.
+    assert!(files.len() < 10, "{} files", files.len());
     let shared = fs::read_to_string(folder.join("UNKNOWN.csv")).unwrap();
     let ids = shared.lines().skip(1).map(|line| line.split(',').nth(4).unwrap().parse::<u32>().unwrap());
-    assert!(ids.eq(70_512..130_000), "{}", shared.lines().take(3).collect::<Vec<_>>().join("\n"));
-    assert_eq!(fs::read_to_string(folder.join("UNKNOWN_70511.csv")).unwrap().lines().count(), 2);
+    assert!(ids.eq(70_000..130_000), "{}", shared.lines().take(3).collect::<Vec<_>>().join("\n"));
 }
 
 #[test]

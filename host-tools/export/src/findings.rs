@@ -12,6 +12,7 @@ use hums_link::{messages, summary};
 use super::context::Context;
 use crate::check;
 use crate::check::judge::{HeardAt, Limits};
+use crate::mavlink::frame::{Peek, peek};
 use crate::source::recording::LogPlace;
 use crate::source::told::Finding;
 
@@ -63,8 +64,8 @@ impl Texts {
         let mut merged = Vec::with_capacity(records.len());
         while let Some((time, frame)) = records.split_first_chunk::<TIME_BYTES>() {
             self.push_until(u64::from_be_bytes(*time), &mut merged);
-            let Some(bytes) = length(frame) else { break };
-            let (record, rest) = records.split_at(records.len().min(TIME_BYTES + bytes));
+            let Peek::Frame(frame) = peek(frame) else { break };
+            let (record, rest) = records.split_at(TIME_BYTES + frame.bytes.len());
             merged.extend_from_slice(record);
             records = rest;
         }
@@ -85,15 +86,6 @@ impl Texts {
             to.extend(at.to_be_bytes());
             to.extend(frame);
         }
-    }
-}
-
-fn length(bytes: &[u8]) -> Option<usize> {
-    let [magic, payload, flags, ..] = *bytes else { return None };
-    match magic {
-        0xFE => Some(8 + usize::from(payload)),
-        0xFD => Some(12 + usize::from(payload) + if flags & 1 == 0 { 0 } else { 13 }),
-        _ => None,
     }
 }
 

@@ -12,7 +12,7 @@ pub enum Table {
     Unverified(u32),
     /// Frames of an id that we have no definition of.
     Unknown(u32),
-    /// Frames of all ids without a definition that have no table of their own.
+    /// Frames of all ids that we have no definition of.
     Unknowns,
     /// The monitor's own.
     Hums(&'static str),

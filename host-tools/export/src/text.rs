@@ -5,7 +5,7 @@
 //! infinities are the strings `"Infinity"` and `"-Infinity"`. Text that is not UTF-8 gets replacement characters; its
 //! bytes are in the `tlog` output.
 
-use hums_dialect::{Field, Kind, Message};
+use hums_dialect::{Kind, Message};
 
 use crate::mavlink::values::{FieldValue, Payload, Scalar};
 
@@ -14,17 +14,13 @@ pub fn columns(message: &Message) -> Vec<String> {
     let mut columns = Vec::new();
     for field in message.fields {
         let units = if field.units.is_empty() { String::new() } else { format!("[{}]", field.units) };
-        if is_text(field) || field.array == 0 {
+        if field.kind == Kind::Char || field.array == 0 {
             columns.push(format!("{}{units}", field.name));
         } else {
             columns.extend((0..field.count()).map(|index| format!("{}[{index}]{units}", field.name)));
         }
     }
     columns
-}
-
-fn is_text(field: &Field) -> bool {
-    field.kind == Kind::Char
 }
 
 /// First characters of a formula, which a spreadsheet would run: a vehicle's text must not become one. The

@@ -17,7 +17,7 @@ use crate::field_names::free_name;
 use crate::format::{
     Entry, Files, Finished, FormatDetails, GroupEncoder, SingleFile, Totals, Writer, lines_of,
 };
-use crate::hex::push_hex;
+use crate::hex::hex;
 use crate::made::OutputFile;
 use crate::mavlink::frame::Frame;
 use crate::mavlink::ids::ACTUATOR_OUTPUT_STATUS;
@@ -83,10 +83,6 @@ impl Lines {
         self.ends.len()
     }
 
-    fn begin(&mut self) -> usize {
-        self.text.len()
-    }
-
     /// A line without fields is dropped.
     fn end(&mut self, start: usize, at: Instant, fields: usize) {
         if fields == 0 {
@@ -98,7 +94,7 @@ impl Lines {
 
     /// A point for a frame.
     pub fn frame(&mut self, tags: &Tags, at: Instant, frame: &Frame<'_>, known: Option<&Payload>) {
-        let start = self.begin();
+        let start = self.text.len();
         let name = Table::of(frame, known.is_some()).name();
         self.text.extend_from_slice(name.as_bytes());
         self.text.extend_from_slice(b",component=");
@@ -112,10 +108,7 @@ impl Lines {
             payload.fields().for_each(|(field, value)| fields.value(field, value));
         } else {
             fields.name("sequence").integer(i64::from(frame.sequence));
-            let out = fields.name("payload").out();
-            out.push(b'"');
-            push_hex(out, frame.payload);
-            out.push(b'"');
+            fields.text("payload", &hex(frame.payload));
         }
         let count = fields.count;
         self.end(start, at, count);
@@ -155,7 +148,7 @@ impl Lines {
         motor: Option<usize>,
         values: impl IntoIterator<Item = (String, Scalar)>,
     ) {
-        let start = self.begin();
+        let start = self.text.len();
         self.text.extend_from_slice(b"HUMS");
         if let Some(motor) = motor {
             self.text.extend_from_slice(b",motor=");
@@ -173,7 +166,7 @@ impl Lines {
 
     /// A point for a record of the monitor's own.
     pub fn row(&mut self, tags: &Tags, at: Instant, row: &Row) {
-        let start = self.begin();
+        let start = self.text.len();
         self.text.extend_from_slice(row.table.as_bytes());
         let mut own: Vec<(&str, String)> = Vec::new();
         for (name, cell) in &row.cells {
@@ -225,10 +218,6 @@ impl<'a> Fields<'a> {
         self
     }
 
-    fn out(&mut self) -> &mut Vec<u8> {
-        self.text
-    }
-
     fn integer(&mut self, value: i64) {
         self.text.extend_from_slice(itoa::Buffer::new().format(value).as_bytes());
         self.text.push(b'i');
@@ -271,7 +260,7 @@ impl<'a> Fields<'a> {
     }
 
     fn text(&mut self, name: &str, text: &str) {
-        let out = self.name(name).out();
+        let out = &mut self.name(name).text;
         out.push(b'"');
         for byte in text.bytes() {
             match byte {
@@ -302,11 +291,7 @@ impl<'a> Fields<'a> {
                 self.name(name).text.extend_from_slice(if *value { b"true" } else { b"false" });
             }
             Cell::Text(text) => self.text(name, text),
-            Cell::Hex(_) => {
-                let mut hex = Vec::new();
-                cell.push_csv(&mut hex);
-                self.text(name, &String::from_utf8_lossy(&hex));
-            }
+            Cell::Hex(bytes) => self.text(name, &hex(bytes)),
             // A field of the line protocol has one type.
             Cell::Words(..) | Cell::Unknown(_) => {}
         }

@@ -1,7 +1,6 @@
 //! CSV: one file for each table.
 
 mod tables;
-mod unknown;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,14 +12,12 @@ use crate::context::Context;
 use crate::files::Folder;
 use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Totals, Writer};
 use crate::hex::push_hex;
-use crate::made::OutputFile;
 use crate::row::Row;
 use crate::story::Story;
 use crate::table::Table;
 use crate::text::{push_csv_cells, push_integer};
 use crate::utc::{push_iso8601, push_seconds};
-use tables::{CsvTables, UNKNOWN_TABLES_MAX};
-use unknown::UnknownLines;
+use tables::CsvTables;
 
 /// The open tables.
 pub(super) struct Csv {
@@ -31,7 +28,6 @@ pub(super) struct Csv {
 #[derive(Default)]
 pub(super) struct Lines {
     tables: BTreeMap<Table, Vec<u8>>,
-    unknown: UnknownLines,
     headers: BTreeMap<&'static str, Vec<&'static str>>,
     tables_bytes: usize,
 }
@@ -52,29 +48,25 @@ impl Lines {
 impl GroupEncoder for Lines {
     fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
         let Entry { frame, known, .. } = entry;
-        let head = |out: &mut Vec<u8>| {
+        let table = match Table::of(frame, known.is_some()) {
+            // There are 16 million ids, and few files.
+            Table::Unknown(_) => Table::Unknowns,
+            table => table,
+        };
+        self.line(table, |out| {
             push_times(out, entry.at, entry.utc_us);
-            for number in [frame.system, frame.component] {
+            let id = (table == Table::Unknowns).then_some(frame.id);
+            let sequence = known.is_none().then(|| frame.sequence.into());
+            let numbers = [Some(frame.system.into()), Some(frame.component.into()), id, sequence];
+            for number in numbers.into_iter().flatten() {
                 out.push(b',');
                 push_integer(out, u64::from(number));
             }
-        };
-        let opaque = |out: &mut Vec<u8>| {
-            out.push(b',');
-            push_integer(out, u64::from(frame.sequence));
-            out.push(b',');
-            push_hex(out, frame.payload);
-        };
-        let table = Table::of(frame, known.is_some());
-        if matches!(table, Table::Unknown(_)) {
-            self.unknown.push(frame.id, head, opaque);
-            return;
-        }
-        self.line(table, |out| {
-            head(out);
-            match known {
-                Some(payload) => push_csv_cells(out, payload),
-                None => opaque(out),
+            if let Some(payload) = known {
+                push_csv_cells(out, payload);
+            } else {
+                out.push(b',');
+                push_hex(out, frame.payload);
             }
         });
     }
@@ -91,8 +83,7 @@ impl GroupEncoder for Lines {
     }
 
     fn held_bytes(&self) -> usize {
-        // Twice, because it is also split by tables.
-        self.tables_bytes + 2 * self.unknown.held_bytes()
+        self.tables_bytes
     }
 }
 
@@ -111,23 +102,13 @@ impl Writer for Csv {
 
     fn part(&mut self, _: &Context, part: Lines, _: &Story) -> Result<()> {
         self.tables.headers(&part.headers);
-        for (table, lines) in &part.tables {
-            self.tables.put(*table, lines)?;
-        }
-        self.tables.put_unknown(&part.unknown)
+        part.tables.iter().try_for_each(|(table, lines)| self.tables.put(*table, lines))
     }
 
     fn finish(self, _: &Context, totals: Totals) -> Result<Finished> {
-        let (tables, shared) = (self.tables.count(), self.tables.has_shared());
+        let tables = self.tables.count();
         self.tables.finish()?;
-        let mut made = vec![totals.of_tables(self.dir.clone(), "csv", tables)];
-        if shared {
-            let words = format!(
-                "the messages without a definition beyond the first {UNKNOWN_TABLES_MAX}, with their ids in a column"
-            );
-            made.push(OutputFile::with_words(self.dir.join("UNKNOWN.csv"), "csv", words));
-        }
-        Ok(Finished { made, remarks: Vec::new() })
+        Ok(totals.of_tables(self.dir, "csv", tables).into())
     }
 }
 

@@ -5,20 +5,15 @@ use std::io::{BufWriter, Write as _};
 
 use anyhow::Result;
 
-use super::unknown::UnknownLines;
 use crate::files::{Folder, FolderFile, buffered, settle};
 use crate::table::Table;
 use crate::text::{columns, push_csv_text};
 
-/// Tables that are open at once at most: there are 16 million ids, and some hundred files for a process.
+/// Tables that are open at once at most: a process has some hundred files.
 const OPEN_MAX: usize = 256;
-
-/// Ids without a definition that have a table of their own at most. The first ones have it; all others share one.
-pub(crate) const UNKNOWN_TABLES_MAX: usize = 512;
 
 pub(crate) struct CsvTables {
     folder: Folder,
-    unknown: BTreeSet<u32>,
     open: BTreeMap<Table, BufWriter<FolderFile>>,
     /// Tables that have their header; not all of them are open.
     begun: BTreeSet<Table>,
@@ -27,13 +22,7 @@ pub(crate) struct CsvTables {
 
 impl CsvTables {
     pub(crate) fn new(folder: Folder) -> Self {
-        Self {
-            folder,
-            unknown: BTreeSet::new(),
-            open: BTreeMap::new(),
-            begun: BTreeSet::new(),
-            headers: BTreeMap::new(),
-        }
+        Self { folder, open: BTreeMap::new(), begun: BTreeSet::new(), headers: BTreeMap::new() }
     }
 
     pub(crate) fn headers(&mut self, headers: &BTreeMap<&'static str, Vec<&'static str>>) {
@@ -68,29 +57,6 @@ impl CsvTables {
         }
         self.open.insert(table, file);
         Ok(())
-    }
-
-    /// Frames of an id beyond [`UNKNOWN_TABLES_MAX`] go to the one table that those ids share.
-    pub(crate) fn put_unknown(&mut self, lines: &UnknownLines) -> Result<()> {
-        let (mut own, mut shared): (BTreeMap<u32, Vec<u8>>, Vec<u8>) = Default::default();
-        for line in lines.iter() {
-            if self.unknown.len() < UNKNOWN_TABLES_MAX {
-                self.unknown.insert(line.id);
-            }
-            if self.unknown.contains(&line.id) {
-                line.push(own.entry(line.id).or_default());
-            } else {
-                line.push_with_id(&mut shared);
-            }
-        }
-        for (id, lines) in own {
-            self.put(Table::Unknown(id), &lines)?;
-        }
-        if shared.is_empty() { Ok(()) } else { self.put(Table::Unknowns, &shared) }
-    }
-
-    pub(crate) fn has_shared(&self) -> bool {
-        self.begun.contains(&Table::Unknowns)
     }
 
     /// Tables so far.

@@ -11,7 +11,7 @@ use parquet::file::writer::SerializedColumnWriter;
 use parquet::schema::types::Type;
 
 use crate::field_names::free_name;
-use crate::hex::push_hex;
+use crate::hex::hex;
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::{FieldValue, Payload, Scalar};
 use crate::row::{Cell, CellType, Row, plain_name};
@@ -248,11 +248,7 @@ impl Column {
     fn push_cell(&mut self, cell: Option<&Cell>) {
         let scalar = match (self.kind, cell) {
             (Kind::Text, Some(Cell::Text(text))) => return self.push_text(text),
-            (Kind::Text, Some(Cell::Hex(bytes))) => {
-                let mut digits = Vec::new();
-                push_hex(&mut digits, bytes);
-                return self.push_text(&String::from_utf8_lossy(&digits));
-            }
+            (Kind::Text, Some(Cell::Hex(bytes))) => return self.push_text(&hex(bytes)),
             (Kind::Unsigned(_) | Kind::Utc, Some(Cell::Count(value))) => Some(Scalar::Unsigned(*value)),
             (Kind::Signed(_), Some(Cell::Signed(value))) => Some(Scalar::Signed(*value)),
             (Kind::Single, Some(Cell::Single(value))) => Some(Scalar::Single(*value)),
@@ -441,11 +437,9 @@ impl TableRows {
             payload.fields().for_each(|(_, value)| push(value));
             return;
         }
-        let mut digits = Vec::new();
-        push_hex(&mut digits, frame.payload);
         push(number(frame.id));
         push(number(frame.sequence.into()));
-        push(FieldValue::Text(&digits));
+        push(FieldValue::Text(hex(frame.payload).as_bytes()));
     }
 
     pub(super) fn row(&mut self, at: Instant, utc_us: Option<u64>, row: &Row) {
