@@ -45,7 +45,8 @@ fn fleet() -> tempfile::TempDir {
     run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     let tlog = fs::read(px4()).expect("a recording");
     fs::write(dir.path().join("few.tlog"), &tlog[..100_000]).expect("written");
-    run(dir.path(), "decode log.hum few.tlog -o fleet --format parquet", 0);
+    let said = run(dir.path(), "decode log.hum few.tlog -o fleet --format parquet", 0).stderr;
+    assert!(String::from_utf8_lossy(&said).contains("has most of its time too"));
     dir
 }
 
@@ -71,6 +72,7 @@ fn every_value_is_there_once_also_after_kills() {
     let said = run(dir.path(), "compact fleet", 0);
     assert!(killed > 0 && text(&said).starts_with("fleet: "), "{killed} {}", text(&said));
     assert!(rows(&at) == before, "rows differ");
+    assert!(contents(&at).iter().all(|(name, _)| !name.contains(".hums-part")));
     assert!(files(&at) <= before.len() && files(&at) < many, "{} of {many}", files(&at));
     assert!(text(&run(dir.path(), "compact fleet", 0)).contains("0 sessions"));
     let again = run(dir.path(), "decode few.tlog -o fleet --format parquet --force", 1);

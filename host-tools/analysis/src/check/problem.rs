@@ -93,8 +93,8 @@ pub(super) const fn rank(level: Level) -> u8 {
     }
 }
 
-/// The bad one.
-pub(super) fn side(check: &str) -> Side {
+/// The side of the limit on which a check's value is bad.
+pub fn side(check: &str) -> Side {
     checks().find(|known| known.name == check).map_or(Side::Above, |check| check.limits.side)
 }
 

@@ -25,8 +25,9 @@ use crate::storage::is_inside;
 pub(crate) const OWN: &str = ".hums-fleet";
 pub(crate) const STORAGE: &str = "storage";
 const COMMIT: &str = "commit-";
-pub(crate) const PART: &str = ".hums-part";
+const PART: &str = ".hums-part";
 const FILES: &str = "files";
+const LOCK: &str = "lock";
 const REPLACED: &str = "replaced";
 const COMPACTED: &str = "compacted";
 
@@ -83,7 +84,7 @@ pub(crate) fn lock(root: &Path) -> Result<Lock> {
     let own = root.join(OWN);
     refuse_copy(&own)?;
     settle(fs::create_dir_all(&own), &own)?;
-    let path = own.join("lock");
+    let path = own.join(LOCK);
     let file = settle(File::options().create(true).truncate(false).write(true).open(&path), &path)?;
     match file.lock() {
         // Without locks of the file system, two runs cannot be distinguished.
@@ -93,12 +94,15 @@ pub(crate) fn lock(root: &Path) -> Result<Lock> {
         _ => {}
     }
     let lock = Lock(file);
-    for name in names(&own)?.iter().filter(|name| name.starts_with(COMMIT)) {
-        let folder = own.join(name);
-        if is_begun(name) {
+    for name in names(&own)? {
+        let folder = own.join(&name);
+        // A program that runs holds the lock of its folder.
+        let is_left = || File::open(folder.join(LOCK)).is_ok_and(|lock| lock.try_lock().is_ok());
+        if is_begun(&name) {
             note!("{}: a change that an earlier run began is completed", root.display());
             settle(apply(root, &folder), root)?;
-        } else {
+        } else if name.starts_with(COMMIT) || name.ends_with(PART) && is_left() {
+            note!("{}: of a run that did not end; removed", folder.display());
             settle(fs::remove_dir_all(&folder), &folder)?;
         }
     }
@@ -140,12 +144,15 @@ pub(crate) struct Transaction {
     /// Complete, and not on the disk yet.
     ended: Mutex<Vec<File>>,
     part: TempDir,
+    /// Of the folder, until the change counts.
+    held: File,
 }
 
 /// A change with all of its new files on the disk.
 pub(crate) struct SyncedChange {
     root: PathBuf,
     part: TempDir,
+    held: File,
     places: Vec<String>,
 }
 
@@ -155,7 +162,11 @@ impl Transaction {
         let part = fs::create_dir_all(&own)
             .and_then(|()| tempfile::Builder::new().prefix(".").suffix(PART).tempdir_in(&own))
             .and_then(|part| fs::create_dir(part.path().join(FILES)).map(|()| part));
-        Ok(Self { root: root.to_owned(), ended: Mutex::default(), part: settle(part, root)? })
+        let part = settle(part, root)?;
+        let held = settle(File::create_new(part.path().join(LOCK)), root)?;
+        // Without locks of the file system, nobody removes its folder.
+        let _ = held.lock();
+        Ok(Self { root: root.to_owned(), ended: Mutex::default(), part, held })
     }
 
     pub(crate) fn path(&self, place: &str) -> PathBuf {
@@ -185,7 +196,7 @@ impl Transaction {
         let files = mem::take(&mut *self.ended.lock().unwrap_or_else(PoisonError::into_inner));
         self.sync_files(files)?;
         let places = self.places()?;
-        Ok(SyncedChange { root: self.root, part: self.part, places })
+        Ok(SyncedChange { root: self.root, part: self.part, held: self.held, places })
     }
 }
 
@@ -198,7 +209,7 @@ impl SyncedChange {
         replaced: &BTreeSet<String>,
         compacted: &[String],
     ) -> Result<Vec<PathBuf>> {
-        let Self { root, part, places } = self;
+        let Self { root, part, held, places } = self;
         let places: Vec<PathBuf> = places.iter().map(|place| root.join(place)).collect();
         // A change that counts must be possible.
         for place in &places {
@@ -207,6 +218,8 @@ impl SyncedChange {
                 bail!("{}: is a directory, and a file is needed there; move it away", place.display());
             }
         }
+        // Some systems rename no folder with an open file.
+        drop(held);
         let committed = Self::count(&root, part, replaced, compacted);
         settle(committed.and_then(|folder| apply(&root, &folder)), &root)?;
         Ok(places)

@@ -243,27 +243,41 @@ impl Writer for Parquet {
     }
 
     fn finish(mut self, context: &Context, totals: Totals) -> Result<Finished> {
+        let mut remarks = Vec::new();
         if let Some(about) = &context.about {
             let mut row = Batches::default();
-            let first = about.overview.ending.summary.first.unwrap_or(Instant::ZERO);
-            row.row(first, context.epochs.utc_us(first), &sessions::row(context, about));
+            let summary = &about.overview.ending.summary;
+            if summary.first.is_none() && about.overview.contents.frames() == 0 {
+                let remarks = vec!["no entry is in it, so it is no session".to_owned()];
+                return Ok(Finished { made: Vec::new(), remarks });
+            }
+            let utc_us = |at: Option<Instant>| context.epochs.utc_us(at?);
+            let first = summary.first.unwrap_or(Instant::ZERO);
+            row.row(first, utc_us(Some(first)), &sessions::row(context, about));
             self.0.put(row)?;
+            let times = utc_us(summary.first).zip(utc_us(summary.last));
+            let other = times.and_then(|(from, to)| self.0.session.same_time(context, from, to));
+            remarks.extend(other.map(|other| {
+                format!(
+                    "session {other} has most of its time too: another recorder, or a part of one recording"
+                )
+            }));
         }
         let (session, tables) = self.0.finish()?;
         let path = session.path(SESSIONS, 1);
-        if let Some(files) = session.finish(context, totals.frames)? {
-            let finished = Finished::from(totals.of_tables(path, "parquet", tables).with_files(files));
-            let today_us =
-                SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |now| now.as_micros() as u64);
-            let tomorrow = iso8601(today_us + DAY_US);
-            let date = context.identity.date.as_deref();
-            let wrong = date.filter(|date| *date < MAVLINK_SINCE || *date > tomorrow.as_str());
-            let why = wrong
-                .map(|date| format!("its clock says {date}, which cannot be; its tables have that date"));
-            return Ok(Finished { remarks: why.into_iter().collect(), ..finished });
+        let (files, remark) = session.finish(context, totals.frames)?;
+        remarks.extend(remark.map(str::to_owned));
+        if files.is_empty() {
+            return Ok(Finished { made: Vec::new(), remarks });
         }
-        let why = "another log of this session has more frames, and is in the tables instead";
-        Ok(Finished { made: Vec::new(), remarks: vec![why.to_owned()] })
+        let today_us = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |now| now.as_micros() as u64);
+        let tomorrow = iso8601(today_us + DAY_US);
+        let date = context.identity.date.as_deref();
+        let wrong = date.filter(|date| *date < MAVLINK_SINCE || *date > tomorrow.as_str());
+        remarks.extend(
+            wrong.map(|date| format!("its clock says {date}, which cannot be; its tables have that date")),
+        );
+        Ok(Finished { made: vec![totals.of_tables(path, "parquet", tables).with_files(files)], remarks })
     }
 }
 
@@ -438,7 +452,7 @@ mod tests {
             let (session, count) = tables.finish().expect("finish");
             assert_eq!(count, 2);
             let paths: Vec<PathBuf> = (1..100).map(|part| session.path("ATTITUDE", part)).collect();
-            let made = session.finish(&context, 4000).expect("finish").expect("files");
+            let made = session.finish(&context, 4000).expect("finish").0;
             let mut seconds = Vec::new();
             let files: Vec<PathBuf> = paths.into_iter().take_while(|path| path.exists()).collect();
             assert!(files.iter().all(|path| made.contains(path)) && made.iter().all(|path| path.exists()));
