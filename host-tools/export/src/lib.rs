@@ -152,9 +152,6 @@ pub fn run(args: &DecodeRequest) -> Result<Outcome> {
 }
 
 fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
-    for about in Formats::new(&args.formats, false).about().filter(|about| !about.omits.is_empty()) {
-        note!("{} cannot hold {}", about.name, about.omits);
-    }
     let alone = |format: &&format::Format| if let Way::Alone(run) = format.way { Some(run) } else { None };
     if let Some(run) = args.formats.iter().find_map(alone) {
         return run(args);

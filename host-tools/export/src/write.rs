@@ -141,6 +141,11 @@ impl<'a> Writers<'a> {
                 "{rows} left out: the names of its tables take more room than any autopilot's"
             ));
         }
+        // Made of quantities: a reader may expect more in it.
+        let about = self.context.formats.about().filter(|about| about.has_observations);
+        for about in about.filter(|about| !about.omits.is_empty()) {
+            all.remarks.push(format!("{} cannot hold {}", about.name, about.omits));
+        }
         for writer in self.files {
             let Finished { made, remarks } = writer.finish(self.context, totals.clone())?;
             all.made.extend(made);

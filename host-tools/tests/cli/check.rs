@@ -668,7 +668,7 @@ fn a_frame_whose_id_is_not_known_is_kept_bit_for_bit() {
     run(dir.path(), "decode flip.tlog -o same.tlog --format tlog", 0);
     assert!(fs::read(dir.path().join("same.tlog")).expect("made") == tlog);
     let packed = run(dir.path(), "decode --format hum flip.tlog -o flip.hum --json", 0);
-    assert!(!String::from_utf8_lossy(&packed.stderr).contains("outside of frames"));
+    assert!(packed.stderr.is_empty(), "no byte is of no frame");
     assert_eq!(json(&packed)["logs"][0]["files"][0]["counts"]["frames"], 16_645);
     run(dir.path(), "info --verify flip.hum", 0);
     run(dir.path(), "decode flip.hum -o back.tlog --format tlog", 0);

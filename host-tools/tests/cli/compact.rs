@@ -45,8 +45,7 @@ fn fleet() -> tempfile::TempDir {
     run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     let tlog = fs::read(px4()).expect("a recording");
     fs::write(dir.path().join("few.tlog"), &tlog[..100_000]).expect("written");
-    let said = run(dir.path(), "decode log.hum few.tlog -o fleet --format parquet", 0).stderr;
-    assert!(String::from_utf8_lossy(&said).contains("has most of its time too"));
+    run(dir.path(), "decode log.hum few.tlog -o fleet --format parquet", 0);
     dir
 }
 

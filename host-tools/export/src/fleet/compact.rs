@@ -119,6 +119,15 @@ fn in_folder(root: &Path, failed: &mut dyn FnMut(&str, &anyhow::Error)) -> Resul
             Err(error) => failed(partition, &error),
         }
     }
+    let parts =
+        names(&root.join(OWN))?.into_iter().filter(|name| name.ends_with(transaction::PART)).count() as u64;
+    if parts > 0 {
+        note!(
+            "{}: {} of runs that did not end; if no hums runs there, they can be deleted",
+            root.join(OWN).display(),
+            count(parts, "folder")
+        );
+    }
     Ok((sum, partitions.len()))
 }
 

@@ -31,7 +31,6 @@ use crate::files::{Inputs, cannot_write, make_directory};
 use crate::hex::hex;
 use crate::outcome::exists;
 use bucket::Bucket;
-use overview::Times;
 use transaction::{OWN, Transaction};
 
 pub(crate) const SESSIONS: &str = "sessions";
@@ -73,8 +72,6 @@ pub(crate) struct Fleet {
     is_begun: Mutex<bool>,
     /// The number of frames of each session.
     written: Mutex<BTreeMap<String, u64>>,
-    /// Vehicle, name and times of the sessions of each date and bucket, read once.
-    times: Mutex<BTreeMap<String, Vec<(String, String, Times)>>>,
 }
 
 enum Found {
@@ -85,8 +82,7 @@ enum Found {
 
 impl Fleet {
     pub(crate) fn new(root: &Path, bucket: Option<Bucket>) -> Self {
-        let (is_begun, written, times) = Default::default();
-        Self { root: root.to_owned(), bucket, is_begun, written, times }
+        Self { root: root.to_owned(), bucket, is_begun: Mutex::default(), written: Mutex::default() }
     }
 
     fn shown(&self, place: &str) -> PathBuf {
@@ -200,11 +196,15 @@ fn names_of(folder: &Path, is_wanted: impl Fn(&DirEntry) -> bool) -> Result<Vec<
     Ok(names)
 }
 
-/// The paths of a session's files, and a remark.
-type Ended = (Vec<PathBuf>, Option<&'static str>);
-
-const SHORTER: &str = "another log of this session has more frames, and is in the tables instead";
-const LONGER: &str = "another log of this session has fewer frames; this one has replaced it in the tables";
+/// What became of a session, with the paths of its files.
+#[derive(Debug)]
+pub(crate) enum Ended {
+    Alone(Vec<PathBuf>),
+    /// In place of a log with fewer frames, of the same call.
+    Replaces(Vec<PathBuf>),
+    /// Another log of the same call has more frames.
+    Dropped,
+}
 
 pub(crate) struct Session {
     transaction: Transaction,
@@ -229,20 +229,6 @@ impl Session {
         Ok(Self { transaction: Transaction::begin(&fleet.root)?, root, partition, name })
     }
 
-    /// The name of another session of the vehicle, of the time between these, in microseconds since 1970.
-    pub(crate) fn same_time(&self, context: &Context, from_us: u64, to_us: u64) -> Option<String> {
-        let (fleet, vehicle) = (context.fleet.as_ref()?, &context.identity.vehicle);
-        let new = Times(from_us as f64, to_us as f64);
-        let mut times = fleet.times.lock().unwrap_or_else(PoisonError::into_inner);
-        let read = || overview::times(&fleet.root.join(SESSIONS).join(&self.partition));
-        let known = times.entry(self.partition.clone()).or_insert_with(read);
-        known.retain(|(_, session, _)| *session != self.name);
-        let is_same = |(of, _, times): &&(String, String, Times)| of == vehicle && times.is_same(new);
-        let other = known.iter().find(is_same).map(|(_, session, _)| session.clone());
-        known.push((vehicle.clone(), self.name.clone(), new));
-        other
-    }
-
     fn place(&self, table: &str, part: u32) -> String {
         format!("{table}/{}/{}", self.partition, file_name(&self.name, part))
     }
@@ -262,7 +248,7 @@ impl Session {
     }
 
     /// All files are there and closed: they take their places. Of two recordings of one session in one call the longer one
-    /// stays. Returns the paths of the files, none if that is the other one, and a remark on the other one.
+    /// stays.
     pub(crate) fn finish(self, context: &Context, frames: u64) -> Result<Ended> {
         let Some(fleet) = &context.fleet else { bail!("the output of the tables is unknown") };
         if let Some(bucket) = &fleet.bucket {
@@ -274,7 +260,7 @@ impl Session {
         let mut written = fleet.written.lock().unwrap_or_else(PoisonError::into_inner);
         let found = fleet.find(&name)?;
         match (written.get(&name), &found) {
-            (Some(other), _) if *other >= frames => return Ok((Vec::new(), Some(SHORTER))),
+            (Some(other), _) if *other >= frames => return Ok(Ended::Dropped),
             (None, Some(found)) => fleet.check(&name, found, &context.inputs)?,
             _ => {}
         }
@@ -283,7 +269,8 @@ impl Session {
             _ => BTreeSet::new(),
         };
         let files = transaction.commit(&lock, &replaced, &[])?;
-        Ok((files, written.insert(name, frames).map(|_| LONGER)))
+        let other = written.insert(name, frames);
+        Ok(if other.is_some() { Ended::Replaces(files) } else { Ended::Alone(files) })
     }
 
     /// [`Self::finish`] in object storage: no other program adds this session meanwhile.
@@ -294,7 +281,7 @@ impl Session {
         let found = fleet.find(&name)?;
         let refused = match (fleet.is_written(&name), &found) {
             // Without its index it is gone, and the lease has its files.
-            (Some(other), Some(_)) if other >= frames => Some(Ok((Vec::new(), Some(SHORTER)))),
+            (Some(other), Some(_)) if other >= frames => Some(Ok(Ended::Dropped)),
             (None, Some(found)) => fleet.check(&name, found, &context.inputs).err().map(Err),
             (Some(_), Some(found @ Found::Compacted)) => {
                 fleet.check(&name, found, &context.inputs).err().map(Err)
@@ -311,6 +298,7 @@ impl Session {
             if let Some(Found::Alone(partition)) = &found { Some(partition.as_str()) } else { None };
         bucket.add(lease, &name, &partition, &files, replaced)?;
         let other = fleet.written.lock().unwrap_or_else(PoisonError::into_inner).insert(name, frames);
-        Ok((places.iter().map(|place| root.join(place)).collect(), other.map(|_| LONGER)))
+        let files = places.iter().map(|place| root.join(place)).collect();
+        Ok(if other.is_some() { Ended::Replaces(files) } else { Ended::Alone(files) })
     }
 }

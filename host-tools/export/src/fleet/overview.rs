@@ -113,9 +113,11 @@ pub struct VehicleProblem {
     sessions: u64,
     session: String,
     day: String,
-    /// Higher is worse: the level, the value, the time.
+    /// Higher is worse; `None` without a value.
     #[serde(skip)]
-    order: (bool, Option<f32>, Option<f64>),
+    badness: Option<f32>,
+    #[serde(skip)]
+    at: Option<f64>,
     #[serde(flatten)]
     problem: Problem,
 }
@@ -145,48 +147,28 @@ struct Gathered {
     figures: BTreeMap<usize, Vec<f64>>,
 }
 
-/// The times of the first and the last entry of a session, microseconds since 1970.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Times(pub(super) f64, pub(super) f64);
-
-impl Times {
-    /// Whether they share more than half of the shorter one. Clocks differ, so sessions in a row may share a little.
-    pub(super) fn is_same(self, other: Self) -> bool {
-        2.0 * (self.1.min(other.1) - self.0.max(other.0)) > (self.1 - self.0).min(other.1 - other.0)
-    }
-}
-
-/// The flights of a session.
+/// The flights of a session, with the times of its first and last entry.
 struct Flown {
-    times: Times,
+    from_us: f64,
+    to_us: f64,
     flights: f64,
     flight_s: f64,
 }
 
-/// Vehicle, name and times of the sessions in a folder of the table; a file that cannot be read has none.
-pub(super) fn times(folder: &Path) -> Vec<(String, String, Times)> {
-    let mut all = Vec::new();
-    for name in names(folder).unwrap_or_default().iter().filter(|name| name.ends_with(EXTENSION)) {
-        let _ = read_file(&folder.join(name), &[], |row| {
-            let said = |name| Some(text(&row, name)?.to_owned());
-            let times = number(&row, "utc").zip(number(&row, "end_utc"));
-            all.extend(
-                said("vehicle")
-                    .zip(said("session"))
-                    .zip(times)
-                    .map(|((vehicle, session), (from, to))| (vehicle, session, Times(from, to))),
-            );
-        });
+impl Flown {
+    /// Whether they share more than half of the shorter one. Clocks differ, so sessions in a row may share a little.
+    fn is_same_time(&self, other: &Self) -> bool {
+        let shared = self.to_us.min(other.to_us) - self.from_us.max(other.from_us);
+        2.0 * shared > (self.to_us - self.from_us).min(other.to_us - other.from_us)
     }
-    all
 }
 
 /// The sessions of a vehicle to sum: of those of the same time the one with more time in the air.
 fn once(mut flown: Vec<Flown>) -> Vec<Flown> {
-    flown.sort_by(|one, other| one.times.0.total_cmp(&other.times.0));
+    flown.sort_by(|one, other| one.from_us.total_cmp(&other.from_us));
     let mut kept: Vec<Flown> = Vec::new();
     for next in flown {
-        match kept.last_mut().filter(|last| last.times.is_same(next.times)) {
+        match kept.last_mut().filter(|last| last.is_same_time(&next)) {
             Some(last) if next.flight_s > last.flight_s => *last = next,
             Some(_) => {}
             None => kept.push(next),
@@ -299,8 +281,8 @@ impl Gathered {
         let (flights, flight_s) = (sum("flights"), sum("flight_time_s"));
         // Vehicles without an id may share a name.
         let is_named = !name.starts_with("system-") && name != "unknown";
-        if let Some((from, to)) = at.zip(number(row, "end_utc")).filter(|_| is_named) {
-            self.flown.push(Flown { times: Times(from, to), flights, flight_s });
+        if let Some((from_us, to_us)) = at.zip(number(row, "end_utc")).filter(|_| is_named) {
+            self.flown.push(Flown { from_us, to_us, flights, flight_s });
         } else {
             vehicle.flights += flights;
             vehicle.flight_s += flight_s;
@@ -338,7 +320,7 @@ impl Gathered {
             let unit = unit_name(&problem.unit).to_owned();
             let number = |number: Option<f32>| number.unwrap_or(f32::NAN);
             let sign = if side(&problem.check) == Side::Below { -1.0 } else { 1.0 };
-            let order = (problem.level == "critical", problem.value.map(|value| sign * value), at);
+            let badness = problem.value.map(|value| sign * value);
             let (state, value, limit) =
                 match shown(&problem.check, number(problem.value), number(problem.limit)) {
                     ShownValue::State(state) => (state, None, None),
@@ -346,13 +328,24 @@ impl Gathered {
                 };
             let problem = Problem { check, state, value, limit, unit, ..problem };
             let (vehicle, session, day) = (said("vehicle"), said("session"), day.to_owned());
-            let found = VehicleProblem { vehicle, sessions: 0, session, day, order, problem };
+            let found = VehicleProblem { vehicle, sessions: 0, session, day, badness, at, problem };
             let known = self.findings.entry(key.clone()).or_insert_with(|| found.clone());
-            if found.order >= known.order {
+            if found.is_worse(known) {
                 *known = VehicleProblem { sessions: known.sessions, ..found };
             }
             known.sessions += u64::from(counted.insert(key));
         }
+    }
+}
+
+impl VehicleProblem {
+    fn is_critical(&self) -> bool {
+        self.problem.level == "critical"
+    }
+
+    /// Of two equal ones the later.
+    fn is_worse(&self, other: &Self) -> bool {
+        (self.is_critical(), self.badness, self.at) >= (other.is_critical(), other.badness, other.at)
     }
 }
 
@@ -378,7 +371,7 @@ impl Overview {
         }
         let used = |part: &DuePart| part.used_percent.unwrap_or(0.0);
         fleet.due.sort_by(|one, other| used(other).total_cmp(&used(one)));
-        fleet.findings.sort_by_key(|found| (!found.order.0, Reverse(found.sessions)));
+        fleet.findings.sort_by_key(|found| (!found.is_critical(), Reverse(found.sessions)));
         fleet.findings_left_out = fleet.findings.len().saturating_sub(FINDINGS_MAX);
         fleet.findings.truncate(FINDINGS_MAX);
         for (kind, vehicles) in kinds {
@@ -449,7 +442,7 @@ mod tests {
             ("flight_time_s", Field::Double(600.0)),
             ("criticals", Field::ULong(0)),
             ("warnings", Field::ULong(1)),
-            ("problems", text(problems)),
+            ("problems", text(&problems.replace("3.4", &format!("3.{session}")))),
             ("parts", text(if session == 1 { parts } else { "[]" })),
             ("steady_vibration_m_s2", Field::Double(vibration)),
         ]
@@ -526,7 +519,7 @@ mod tests {
         assert_eq!(vehicle.days, ("2026-05-01".to_owned(), "2026-05-03".to_owned()));
         assert_eq!((found.due.len(), found.due[0].part.as_str()), (2, "motor 1"));
         let finding = &found.findings[0];
-        assert_eq!((found.findings.len(), finding.sessions, finding.day.as_str()), (2, 3, "2026-05-03"));
-        assert!(!finding.order.0 && finding.problem.check == "battery 1 cell low", "{finding:?}");
+        assert_eq!((found.findings.len(), finding.sessions, finding.day.as_str()), (2, 3, "2026-05-01"));
+        assert!(!finding.is_critical() && finding.problem.check == "battery 1 cell low", "{finding:?}");
     }
 }

@@ -25,7 +25,7 @@ use crate::storage::is_inside;
 pub(crate) const OWN: &str = ".hums-fleet";
 pub(crate) const STORAGE: &str = "storage";
 const COMMIT: &str = "commit-";
-const PART: &str = ".hums-part";
+pub(crate) const PART: &str = ".hums-part";
 const FILES: &str = "files";
 const LOCK: &str = "lock";
 const REPLACED: &str = "replaced";
@@ -163,9 +163,13 @@ impl Transaction {
             .and_then(|()| tempfile::Builder::new().prefix(".").suffix(PART).tempdir_in(&own))
             .and_then(|part| fs::create_dir(part.path().join(FILES)).map(|()| part));
         let part = settle(part, root)?;
-        let held = settle(File::create_new(part.path().join(LOCK)), root)?;
+        // It has its name once it is locked: nobody removes the folder before.
+        let new = part.path().join("new");
+        let held = settle(File::create_new(&new), root)?;
         // Without locks of the file system, nobody removes its folder.
-        let _ = held.lock();
+        if held.lock().is_ok() {
+            settle(fs::rename(new, part.path().join(LOCK)), root)?;
+        }
         Ok(Self { root: root.to_owned(), ended: Mutex::default(), part, held })
     }
 

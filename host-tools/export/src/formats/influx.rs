@@ -260,7 +260,7 @@ impl<'a> Fields<'a> {
     }
 
     fn text(&mut self, name: &str, text: &str) {
-        let out = &mut self.name(name).text;
+        let out = &mut *self.name(name).text;
         out.push(b'"');
         for byte in text.bytes() {
             match byte {

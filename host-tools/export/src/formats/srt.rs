@@ -138,8 +138,6 @@ impl Writer for Srt {
         if self.begin_us.is_some() {
             self.cue(context, self.next_us)?;
         }
-        let made = vec![OutputFile::of(self.file.finish()?, "srt", &[(self.cues, "subtitle")])];
-        let remark = "srt has time, height, speed, battery and findings; other messages are not in it";
-        Ok(Finished { made, remarks: vec![remark.to_owned()] })
+        Ok(OutputFile::of(self.file.finish()?, "srt", &[(self.cues, "subtitle")]).into())
     }
 }

@@ -376,6 +376,7 @@ impl Ulog {
             |key: &str, text: &str| keyed(b'I', &format!("char[{}] {key}", text.len()), text.as_bytes());
         out.extend(text("sys_name", autopilot));
         out.extend(text("ver_hw", "unknown"));
+        out.extend(text("ver_sw", concat!("hums ", env!("CARGO_PKG_VERSION"))));
         if let Some(identity) = vehicle.identity.get() {
             out.extend(keyed(b'I', "uint32_t ver_sw_release", &identity.firmware.to_le_bytes()));
             if identity.uid != 0 {

@@ -36,7 +36,7 @@ use parquet::schema::types::Type;
 
 use crate::context::Context;
 use crate::files::cannot_write;
-use crate::fleet::{SESSIONS, Session, sessions};
+use crate::fleet::{Ended, SESSIONS, Session, sessions};
 use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Totals, Writer};
 use crate::identity::Identity;
 use crate::logs::in_order::{in_order, workers};
@@ -243,7 +243,6 @@ impl Writer for Parquet {
     }
 
     fn finish(mut self, context: &Context, totals: Totals) -> Result<Finished> {
-        let mut remarks = Vec::new();
         if let Some(about) = &context.about {
             let mut row = Batches::default();
             let summary = &about.overview.ending.summary;
@@ -251,25 +250,24 @@ impl Writer for Parquet {
                 let remarks = vec!["no entry is in it, so it is no session".to_owned()];
                 return Ok(Finished { made: Vec::new(), remarks });
             }
-            let utc_us = |at: Option<Instant>| context.epochs.utc_us(at?);
             let first = summary.first.unwrap_or(Instant::ZERO);
-            row.row(first, utc_us(Some(first)), &sessions::row(context, about));
+            row.row(first, context.epochs.utc_us(first), &sessions::row(context, about));
             self.0.put(row)?;
-            let times = utc_us(summary.first).zip(utc_us(summary.last));
-            let other = times.and_then(|(from, to)| self.0.session.same_time(context, from, to));
-            remarks.extend(other.map(|other| {
-                format!(
-                    "session {other} has most of its time too: another recorder, or a part of one recording"
-                )
-            }));
         }
         let (session, tables) = self.0.finish()?;
         let path = session.path(SESSIONS, 1);
-        let (files, remark) = session.finish(context, totals.frames)?;
-        remarks.extend(remark.map(str::to_owned));
-        if files.is_empty() {
-            return Ok(Finished { made: Vec::new(), remarks });
-        }
+        let mut remarks = Vec::new();
+        let files = match session.finish(context, totals.frames)? {
+            Ended::Alone(files) => files,
+            Ended::Replaces(files) => {
+                remarks.push("has replaced another log of this session, which has fewer frames".to_owned());
+                files
+            }
+            Ended::Dropped => {
+                let why = "another log of this session has more frames, and is in the tables instead";
+                return Ok(Finished { made: Vec::new(), remarks: vec![why.to_owned()] });
+            }
+        };
         let today_us = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |now| now.as_micros() as u64);
         let tomorrow = iso8601(today_us + DAY_US);
         let date = context.identity.date.as_deref();
@@ -452,7 +450,7 @@ mod tests {
             let (session, count) = tables.finish().expect("finish");
             assert_eq!(count, 2);
             let paths: Vec<PathBuf> = (1..100).map(|part| session.path("ATTITUDE", part)).collect();
-            let made = session.finish(&context, 4000).expect("finish").0;
+            let Ended::Alone(made) = session.finish(&context, 4000).expect("finish") else { panic!("alone") };
             let mut seconds = Vec::new();
             let files: Vec<PathBuf> = paths.into_iter().take_while(|path| path.exists()).collect();
             assert!(files.iter().all(|path| made.contains(path)) && made.iter().all(|path| path.exists()));
