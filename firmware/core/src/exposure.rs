@@ -33,7 +33,8 @@ impl ExposureQuantity {
         }
     }
 
-    pub(crate) const fn edges(self) -> [f32; BINS - 1] {
+    /// The limits between its ranges.
+    pub const fn edges(self) -> [f32; BINS - 1] {
         match self {
             Self::EscTemperature => [30.0, 45.0, 60.0, 75.0, 90.0, 100.0, 110.0],
             Self::BatteryTemperature => [0.0, 15.0, 30.0, 40.0, 50.0, 60.0, 75.0],

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use hums_core::figures::Quantity;
-use hums_core::usage::{CounterName, UsageCounter, counter_name as meaning};
+use hums_core::usage::UsageCounter;
 use hums_core::vehicle::Vehicle;
 use serde::Serialize;
 
-use crate::names::counter_name;
+use crate::names::{CounterName, counter_meaning, counter_name};
 
 /// All counters of a session.
 #[derive(Debug, Default, Serialize)]
@@ -173,7 +173,7 @@ pub fn of(session: &BTreeMap<String, f64>, life: &BTreeMap<String, f64>) -> Coun
         let name = counter_name(number);
         let Some(&value) = session.get(&name) else { continue };
         let lived = life.get(&name).copied();
-        let (title, unit, decimals) = match meaning(number) {
+        let (title, unit, decimals) = match counter_meaning(number) {
             // One landing: no contradiction.
             Some(CounterName::Vehicle(FLIGHTS)) if all.remark.is_some() => ("Take-offs".to_owned(), "", 0),
             Some(CounterName::Vehicle(name)) => of_vehicle(name),

@@ -2,9 +2,13 @@
 
 use std::borrow::Cow;
 
+use hums_core::exposure::{BINS, ExposureQuantity};
 use hums_core::figures::Quantity;
 use hums_core::health::{self, Words};
-use hums_core::usage::{self, CounterName};
+use hums_core::observation::MOTORS_MAX;
+use hums_core::usage::{
+    EXPOSURE_FIRST, FIGURE_FIRST, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter,
+};
 
 use crate::trend_words::WORDS;
 
@@ -43,9 +47,47 @@ pub fn unit_name(unit: &str) -> &str {
     }
 }
 
+/// The meaning of a counter's number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CounterName {
+    /// A counter of the vehicle.
+    Vehicle(&'static str),
+    /// A counter of one motor, numbered from 0: name and motor.
+    Motor(&'static str, u8),
+    /// Seconds that a quantity stood from the first figure to the second; infinite where the range has no end.
+    Exposure(ExposureQuantity, f32, f32),
+    /// A figure of a flight.
+    Figure(Quantity),
+}
+
+/// `None` for a number of a later version.
+pub fn counter_meaning(number: u8) -> Option<CounterName> {
+    let motor = |first: u8| number.checked_sub(first).filter(|motor| usize::from(*motor) < MOTORS_MAX);
+    if let Some(motor) = motor(MOTOR_TIME_FIRST) {
+        return Some(CounterName::Motor("run_time_s", motor));
+    }
+    if let Some(motor) = motor(MOTOR_REVOLUTIONS_FIRST) {
+        return Some(CounterName::Motor("revolutions", motor));
+    }
+    if let Some(quantity) = number.checked_sub(FIGURE_FIRST) {
+        return Quantity::from_index(usize::from(quantity)).map(CounterName::Figure);
+    }
+    if let Some(range) = number.checked_sub(EXPOSURE_FIRST) {
+        let quantity = ExposureQuantity::ALL.get(usize::from(range) / BINS)?;
+        let (edges, bin) = (quantity.edges(), usize::from(range) % BINS);
+        let from = bin.checked_sub(1).map_or(f32::NEG_INFINITY, |below| edges[below]);
+        let to = edges.get(bin).copied().unwrap_or(f32::INFINITY);
+        return Some(CounterName::Exposure(*quantity, from, to));
+    }
+    UsageCounter::ALL
+        .iter()
+        .find(|counter| counter.number() == number)
+        .map(|counter| CounterName::Vehicle(counter.name()))
+}
+
 /// `flight_time_s`, `motor0_run_time_s`; `counter_123` if unknown.
 pub fn counter_name(number: u8) -> String {
-    match usage::counter_name(number) {
+    match counter_meaning(number) {
         Some(CounterName::Vehicle(name)) => name.to_owned(),
         Some(CounterName::Motor(name, motor)) => format!("motor{motor}_{name}"),
         Some(CounterName::Exposure(quantity, from, to)) => {
@@ -150,6 +192,8 @@ pub fn type_name(number: u8) -> String {
 mod tests {
     use std::collections::HashSet;
 
+    use hums_core::usage::{exposure_number, figure_number};
+
     use super::*;
 
     #[test]
@@ -161,5 +205,31 @@ mod tests {
         {
             assert!(names.contains(range), "{range}");
         }
+    }
+
+    #[test]
+    fn ranges_and_figures_are_named_by_their_numbers() {
+        let first = exposure_number(ExposureQuantity::Vibration, 0);
+        let name = counter_meaning(first);
+        assert_eq!(name, Some(CounterName::Exposure(ExposureQuantity::Vibration, f32::NEG_INFINITY, 1.0)));
+        let last = counter_meaning(exposure_number(ExposureQuantity::Current, BINS - 1));
+        assert_eq!(last, Some(CounterName::Exposure(ExposureQuantity::Current, 160.0, f32::INFINITY)));
+        let motor = Quantity::MotorSpeed(11);
+        assert_eq!(counter_meaning(figure_number(motor)), Some(CounterName::Figure(motor)));
+    }
+
+    #[test]
+    fn every_counter_has_a_number_of_its_own_and_a_name() {
+        let mut count = 0;
+        for number in 0..=255 {
+            if let Some(name) = counter_meaning(number) {
+                count += 1;
+                assert!(!matches!(name, CounterName::Vehicle("")), "{number}");
+            }
+        }
+        assert_eq!(
+            count,
+            UsageCounter::ALL.len() + 2 * MOTORS_MAX + BINS * ExposureQuantity::ALL.len() + Quantity::COUNT
+        );
     }
 }

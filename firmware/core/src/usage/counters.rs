@@ -2,7 +2,6 @@
 
 use crate::exposure::{BINS, ExposureQuantity};
 use crate::figures::Quantity as Steady;
-use crate::observation::MOTORS_MAX;
 
 /// How a counter adds up over sessions, and its stored form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,19 +153,6 @@ pub const FIGURE_FIRST: u8 = 200;
 const _: () = assert!(EXPOSURE_FIRST as usize + BINS * ExposureQuantity::ALL.len() <= FIGURE_FIRST as usize);
 const _: () = assert!(FIGURE_FIRST as usize + Steady::COUNT <= 256);
 
-/// The meaning of a stored counter number.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum CounterName {
-    /// A counter of the vehicle.
-    Vehicle(&'static str),
-    /// A counter of one motor, numbered from 0: name and motor.
-    Motor(&'static str, u8),
-    /// Seconds that a quantity stood from the first figure to the second; infinite where the range has no end.
-    Exposure(ExposureQuantity, f32, f32),
-    /// A figure of a flight.
-    Figure(Steady),
-}
-
 /// The number of the time that a quantity stood in a range.
 pub const fn exposure_number(quantity: ExposureQuantity, bin: usize) -> u8 {
     EXPOSURE_FIRST + quantity as u8 * BINS as u8 + bin as u8
@@ -175,60 +161,4 @@ pub const fn exposure_number(quantity: ExposureQuantity, bin: usize) -> u8 {
 /// The number of a flight's figure.
 pub fn figure_number(quantity: Steady) -> u8 {
     FIGURE_FIRST + quantity.index() as u8
-}
-
-/// The meaning of a stored counter number; `None` for a number of a later version.
-pub fn counter_name(number: u8) -> Option<CounterName> {
-    let motor = |first: u8| number.checked_sub(first).filter(|motor| usize::from(*motor) < MOTORS_MAX);
-    if let Some(motor) = motor(MOTOR_TIME_FIRST) {
-        return Some(CounterName::Motor("run_time_s", motor));
-    }
-    if let Some(motor) = motor(MOTOR_REVOLUTIONS_FIRST) {
-        return Some(CounterName::Motor("revolutions", motor));
-    }
-    if let Some(quantity) = number.checked_sub(FIGURE_FIRST) {
-        return Steady::from_index(usize::from(quantity)).map(CounterName::Figure);
-    }
-    if let Some(range) = number.checked_sub(EXPOSURE_FIRST) {
-        let quantity = ExposureQuantity::ALL.get(usize::from(range) / BINS)?;
-        let (edges, bin) = (quantity.edges(), usize::from(range) % BINS);
-        let from = bin.checked_sub(1).map_or(f32::NEG_INFINITY, |below| edges[below]);
-        let to = edges.get(bin).copied().unwrap_or(f32::INFINITY);
-        return Some(CounterName::Exposure(*quantity, from, to));
-    }
-    UsageCounter::ALL
-        .iter()
-        .find(|counter| counter.number() == number)
-        .map(|counter| CounterName::Vehicle(counter.name()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ranges_and_figures_are_named_by_their_numbers() {
-        let first = exposure_number(ExposureQuantity::Vibration, 0);
-        let name = counter_name(first);
-        assert_eq!(name, Some(CounterName::Exposure(ExposureQuantity::Vibration, f32::NEG_INFINITY, 1.0)));
-        let last = counter_name(exposure_number(ExposureQuantity::Current, BINS - 1));
-        assert_eq!(last, Some(CounterName::Exposure(ExposureQuantity::Current, 160.0, f32::INFINITY)));
-        let motor = Steady::MotorSpeed(11);
-        assert_eq!(counter_name(figure_number(motor)), Some(CounterName::Figure(motor)));
-    }
-
-    #[test]
-    fn every_counter_has_a_number_of_its_own_and_a_name() {
-        let mut count = 0;
-        for number in 0..=255 {
-            if let Some(name) = counter_name(number) {
-                count += 1;
-                assert!(!matches!(name, CounterName::Vehicle("")), "{number}");
-            }
-        }
-        assert_eq!(
-            count,
-            UsageCounter::ALL.len() + 2 * MOTORS_MAX + BINS * ExposureQuantity::ALL.len() + Steady::COUNT
-        );
-    }
 }

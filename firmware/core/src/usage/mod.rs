@@ -4,8 +4,8 @@ mod counters;
 mod totals;
 
 pub use counters::{
-    CounterName, EXPOSURE_FIRST, FIGURE_FIRST, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter,
-    counter_name, exposure_number, figure_number,
+    EXPOSURE_FIRST, FIGURE_FIRST, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter,
+    exposure_number, figure_number,
 };
 pub use totals::{MotorTotals, Totals};
 

@@ -17,7 +17,6 @@ use hums_analysis::counters::of_figure;
 use hums_analysis::states::{ShownValue, shown};
 use hums_core::figures::Quantity;
 use hums_core::health::Side;
-use hums_core::usage::{CounterName, counter_name as meaning};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
@@ -25,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use super::transaction;
 use super::{EXTENSION, SESSIONS, folders, names};
-use crate::names::{check_name, counter_name, unit_name};
+use crate::names::{CounterName, check_name, counter_meaning, counter_name, unit_name};
 
 /// Vehicles of a kind at least: the median of fewer says little.
 const VEHICLES_MIN: usize = 5;
@@ -181,7 +180,7 @@ fn once(mut flown: Vec<Flown>) -> Vec<Flown> {
 type Medians = BTreeMap<usize, f64>;
 
 fn figures() -> Vec<(String, Quantity)> {
-    let figure = |number| match meaning(number) {
+    let figure = |number| match counter_meaning(number) {
         // A motor differs from its neighbours, not from other vehicles.
         Some(CounterName::Figure(Quantity::MotorSpeed(_) | Quantity::MotorOutput(_))) | None => None,
         Some(CounterName::Figure(quantity)) => Some((counter_name(number), quantity)),

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use hums_analysis::log_json::{VehicleJson, duration_s, finite, vehicle};
 use hums_core::figures::Quantity;
 use hums_core::health::Level;
-use hums_core::usage::{CounterName, UsageCounter, counter_name as meaning};
+use hums_core::usage::UsageCounter;
 use serde::Serialize;
 
 use super::SESSIONS;
@@ -14,14 +14,14 @@ use crate::checked::{Checked, FindingCount, problems_of};
 use crate::context::Context;
 use crate::hex::hex;
 use crate::identity::RecordingContent;
-use crate::names::counter_name;
+use crate::names::{CounterName, counter_meaning, counter_name};
 use crate::row::{Cell, CellType, Row};
 use crate::source::recording::Format;
 use crate::summary::BootLine;
 use crate::wear::parts_of;
 
 static COUNTERS: LazyLock<Vec<String>> = LazyLock::new(|| {
-    let has_column = |number: &u8| match meaning(*number) {
+    let has_column = |number: &u8| match counter_meaning(*number) {
         Some(CounterName::Vehicle(_) | CounterName::Motor("run_time_s", _)) => true,
         Some(CounterName::Figure(figure)) => {
             !matches!(figure, Quantity::MotorSpeed(_) | Quantity::MotorOutput(_))
