@@ -1,5 +1,4 @@
-//! Quantities derived from several messages: cell voltage, silence of an ESC against its own rhythm, imbalance of
-//! motors in steady flight, recent clips, load factor.
+//! Quantities derived from several messages: cell voltage, recent clips, load factor.
 
 use crate::battery_cells::Cells;
 use crate::crosscheck::Crosschecks;
@@ -22,13 +21,6 @@ const SHAKES_MPS2: f32 = 60.0;
 const SAG_MAX_V: f32 = 0.3;
 /// A plane with less throttle glides: autopilots let its motor idle from some percents on.
 const OFF_THROTTLE: f32 = 0.03;
-/// A link on which nothing at all came for so long was silent, unless it often is: streams of one a second have such pauses.
-const SILENCE_S: f32 = 0.3;
-const SILENCE_PAUSES: f32 = 3.0;
-/// A pause counts as at most this, s. Each observation shortens the longest one by this part, so it is forgotten
-/// after some hundred.
-const PAUSE_MAX_S: f32 = 1.0;
-const PAUSE_FADES: f32 = 1.0 / 64.0;
 const LOSS_MEMORY: Millis = Millis::from_secs(10);
 
 state! {
@@ -40,11 +32,6 @@ state! {
         pub(crate) crosschecks: Crosschecks,
         /// Of the last sample, and smoothed.
         load_factor: Latest<[f32; 2]>,
-        heard: Option<BootMs>,
-        /// When it was heard again after a silence, or a plane had no throttle last.
-        resumed: BootMs,
-        /// The longest recent pause between two observations, s.
-        pause_s: f32,
         /// Receivers that have had a 3D fix since power-on.
         pub(crate) had_fix: [bool; RECEIVERS_MAX],
         clips: RecentCount,
@@ -80,20 +67,9 @@ impl RecentCount {
 }
 
 impl Derived {
-    fn hear(&mut self, at: BootMs) {
-        let pause_s = self.heard.map(|heard| at.since(heard).as_secs_f32());
-        if pause_s.is_none_or(|pause_s| pause_s > SILENCE_S.max(SILENCE_PAUSES * self.pause_s)) {
-            self.resumed = at;
-        }
-        let pause_s = pause_s.unwrap_or(0.0).min(PAUSE_MAX_S);
-        self.pause_s = pause_s.max(self.pause_s * (1.0 - PAUSE_FADES));
-        self.heard = Some(at);
-        self.motors.hear();
-    }
-
     /// Takes an observation that the vehicle took.
     pub fn observe(&mut self, at: BootMs, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
-        self.hear(at);
+        self.motors.hear(at);
         self.crosschecks.observe(at, vehicle, observation);
         match observation {
             Observation::Imu(imu) | Observation::ImuAndAir(imu, _) => self.take_imu(at, imu, vehicle),
@@ -101,7 +77,7 @@ impl Derived {
                 // On wings a motor is off without throttle, and its ESC may fall silent.
                 let is_off = hud.throttle.is_some_and(|throttle| throttle.0 < OFF_THROTTLE);
                 if is_off && vehicle.hovers(at) == Some(false) {
-                    self.resumed = at;
+                    self.motors.resume(at);
                 }
             }
             Observation::Outputs(outputs) => {
@@ -218,16 +194,6 @@ impl Derived {
         let cells = f32::from(self.cell_count(vehicle, battery, params).max(1));
         let sag_v = self.resistance.get(battery).zip(current).map_or(0.0, |(of, current)| of.sag_v(current));
         (sag_v / cells).min(SAG_MAX_V)
-    }
-
-    /// Seconds since an ESC last sent speed or current, up to when the vehicle was received last; 0 until it has missed some.
-    pub(crate) fn esc_silence(&self, now: BootMs, motor: u8) -> Option<Reading> {
-        let heard = self.heard?;
-        Reading::new(Some(heard.earlier(now)), self.motors.silence_s(heard, self.resumed, motor))
-    }
-
-    pub(crate) fn are_escs_silent(&self) -> bool {
-        self.heard.is_some_and(|heard| self.motors.are_silent(heard, self.resumed))
     }
 
     /// Clipped samples of the worst accelerometer in this flight, since ten seconds went by without any.

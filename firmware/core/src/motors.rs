@@ -38,6 +38,13 @@ const INTERVALS_MISSED_SLOW: f32 = 5.0;
 const SLOW_S: f32 = 0.7;
 /// Of more messages between two of an ESC some are of a list of parameters.
 const MESSAGES_MAX: u16 = 1_000;
+/// A link on which nothing at all came for so long was silent, unless it often is: streams of one a second have such pauses.
+const SILENCE_S: f32 = 0.3;
+const SILENCE_PAUSES: f32 = 3.0;
+/// A pause counts as at most this, s. Each observation shortens the longest one by this part, so it is forgotten
+/// after some hundred.
+const PAUSE_MAX_S: f32 = 1.0;
+const PAUSE_FADES: f32 = 1.0 / 64.0;
 /// Below this part of their highest speed motors do not carry a vehicle (thrust goes by the square).
 const FLYING_PART: f32 = 0.2;
 /// Below this part of the middle speed a motor is lost; no control in steady flight drives it there.
@@ -105,6 +112,12 @@ state! {
     pub(crate) struct Motors {
         tracks: [Track; MOTORS_MAX] = [Track::default(); MOTORS_MAX],
         pub(crate) outputs: MotorOutputs,
+        /// When the vehicle was heard last.
+        heard: Option<BootMs>,
+        /// When it was heard again after a silence, or a plane had no throttle last.
+        resumed: BootMs,
+        /// The longest recent pause between two observations, s.
+        pause_s: f32,
         /// Messages since the last one of any ESC, and eight times their smoothed number between two.
         messages: u16,
         interval_messages: u16,
@@ -114,8 +127,19 @@ state! {
 }
 
 impl Motors {
-    pub(crate) const fn hear(&mut self) {
+    pub(crate) fn hear(&mut self, at: BootMs) {
+        let pause_s = self.heard.map(|heard| at.since(heard).as_secs_f32());
+        if pause_s.is_none_or(|pause_s| pause_s > SILENCE_S.max(SILENCE_PAUSES * self.pause_s)) {
+            self.resumed = at;
+        }
+        let pause_s = pause_s.unwrap_or(0.0).min(PAUSE_MAX_S);
+        self.pause_s = pause_s.max(self.pause_s * (1.0 - PAUSE_FADES));
+        self.heard = Some(at);
         self.messages = self.messages.saturating_add(1);
+    }
+
+    pub(crate) const fn resume(&mut self, at: BootMs) {
+        self.resumed = at;
     }
 
     pub(crate) fn take(&mut self, at: BootMs, group: &EscGroup, vehicle: &Vehicle, airborne: bool) {
@@ -179,9 +203,9 @@ impl Motors {
 
     /// Seconds since an ESC last sent speed or current, once it has missed some of its own intervals; 0 before. Up to when the vehicle was
     /// received last, since the link resumed: a silent link says nothing about an ESC, nor does a slow one that delivers as few other messages.
-    pub(crate) fn silence_s(&self, heard: BootMs, resumed: BootMs, motor: u8) -> Option<f32> {
-        let track = self.track(motor)?;
-        let silence_s = heard.since(track.last.instant(heard)?.later(resumed)).as_secs_f32();
+    pub(crate) fn silence(&self, now: BootMs, motor: u8) -> Option<Reading> {
+        let (heard, track) = (self.heard?, self.track(motor)?);
+        let silence_s = heard.since(track.last.instant(heard)?.later(self.resumed)).as_secs_f32();
         let intervals = if track.interval_s > SLOW_S { INTERVALS_MISSED_SLOW } else { INTERVALS_MISSED };
         let age_s = |track: &Track| track.last.age(heard).map_or(f32::INFINITY, Millis::as_secs_f32);
         // Groups of ESCs follow each other.
@@ -190,15 +214,14 @@ impl Motors {
             && silence_s > intervals * track.interval_s
             && (others_come
                 || 8.0 * f32::from(self.messages) > intervals * f32::from(self.interval_messages));
-        Some(if missed { silence_s } else { 0.0 })
+        Some(Reading { at: heard.earlier(now), value: if missed { silence_s } else { 0.0 } })
     }
 
     /// Motors that carry the vehicle do not fail together; the wire of their telemetry does.
-    pub(crate) fn are_silent(&self, heard: BootMs, resumed: BootMs) -> bool {
+    pub(crate) fn are_silent(&self, now: BootMs) -> bool {
         let mut known =
             (0..).zip(&self.tracks).filter(|(_, track)| track.interval_s > 0.0).map(|(motor, _)| motor);
-        let is_silent =
-            |motor| self.silence_s(heard, resumed, motor).is_some_and(|silence_s| silence_s > 0.0);
+        let is_silent = |motor| self.silence(now, motor).is_some_and(|silence| silence.value > 0.0);
         known.clone().count() > 1 && known.all(is_silent)
     }
 

@@ -35,7 +35,7 @@ fn reading(inputs: &Inputs<'_>, kind: MishapKind) -> Option<Reading> {
 /// * none of a sinking vehicle on wings, which glides.
 pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl FnOnce() -> bool) -> Orders {
     let Inputs { now, vehicle, derived, flight, .. } = *inputs;
-    if check.name == "esc_silent" && derived.are_escs_silent() {
+    if check.name == "esc_silent" && derived.motors.are_silent(now) {
         return Orders::Watch;
     }
     // It comes down or lies on the ground, even if it reports otherwise.

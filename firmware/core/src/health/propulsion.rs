@@ -13,7 +13,7 @@ const ESC: Check = Check {
     when: CheckPhase::Armed,
     instances: MOTORS_MAX as u8,
     of: InstanceKind::Motor,
-    read: |inputs, motor| inputs.derived.esc_silence(inputs.now, motor),
+    read: |inputs, motor| inputs.derived.motors.silence(inputs.now, motor),
     ..PLAIN
 };
 
