@@ -53,5 +53,5 @@ fn distance_m(one: Position, other: Position) -> f32 {
     let north_m = ((one.latitude_deg - other.latitude_deg) * DEGREE_M) as f32;
     let turns_deg = one.longitude_deg - other.longitude_deg;
     let east_m = (turns_deg * DEGREE_M) as f32 * libm::cosf((one.latitude_deg as f32).to_radians());
-    libm::sqrtf(north_m * north_m + east_m * east_m)
+    norm([north_m, east_m])
 }

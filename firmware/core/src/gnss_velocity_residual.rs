@@ -14,7 +14,7 @@ use crate::latest::Reading;
 use crate::observation::Gnss;
 use crate::residual::{LATE_S, RECEIVER_S, smooth};
 use crate::time::{BootMs, Millis, PAUSE, Stamp};
-use crate::units::{DEGREE_M, Metres, Position};
+use crate::units::{DEGREE_M, Metres, Position, norm};
 
 /// Positions are compared in units of 1e-7 degrees of latitude, in metres.
 const UNIT_M: f32 = (DEGREE_M * 1e-7) as f32;
@@ -78,14 +78,10 @@ impl GnssVelocity {
 
     pub(crate) fn residual(&self, now: BootMs) -> Option<Reading> {
         let velocity = self.before?.velocity;
-        let changed_mps = length([0, 1].map(|axis| velocity[axis] - self.mean[axis]));
-        let off_mps = (length(self.off) - LATE_S / RECEIVER_S * changed_mps).max(0.0);
+        let changed_mps = norm([0, 1].map(|axis| velocity[axis] - self.mean[axis]));
+        let off_mps = (norm(self.off) - LATE_S / RECEIVER_S * changed_mps).max(0.0);
         Reading::new(self.at.instant(now).filter(|_| self.known_s >= RECEIVER_S), Some(off_mps))
     }
-}
-
-fn length([north, east]: [f32; 2]) -> f32 {
-    libm::sqrtf(north * north + east * east)
 }
 
 fn fix(gnss: &Gnss) -> Option<Fix> {

@@ -104,13 +104,12 @@ impl ImuGnssResidual {
         let step = self.at.age(at).filter(|step| *step > Millis::ZERO && *step <= PAUSE);
         self.at = Stamp::at(at);
         let missing = self.take_velocity(step, velocity, if on_rotors { 3 } else { 2 });
-        let shaken = SHAKE_PART * vehicle.inertial.step;
         if missing.is_some_and(|missing| !missing.is_finite()) {
-            (self.at, self.residual) = (Stamp::NONE, None);
-            return;
+            self.at = Stamp::NONE;
         }
-        self.residual =
-            missing.filter(|_| gates.are(gates::STILL)).map(|missing| (missing - shaken).max(0.0));
+        let shaken = SHAKE_PART * vehicle.inertial.step;
+        let judged = missing.filter(|missing| missing.is_finite() && gates.are(gates::STILL));
+        self.residual = judged.map(|missing| (missing - shaken).max(0.0));
     }
 
     /// Takes a velocity, with the time since the one before if the two are compared. Returns the missing force in the
@@ -141,11 +140,11 @@ impl ImuGnssResidual {
         smooth(&mut self.force, force, weight, f32::INFINITY);
         let changes = [0, 1, 2].map(|axis| (force[axis] - self.force[axis]) / SMOOTHING_S);
         let ([north, east, down], [force_north, force_east, _]) = (self.missing, self.force);
-        let specific_force = norm([force_north, force_east, 0.0]);
-        let kinematic_acceleration = norm([force_north - north, force_east - east, 0.0]);
-        let level = (norm([north, east, 0.0]) - HEADING_PART * kinematic_acceleration)
+        let specific_force = norm([force_north, force_east]);
+        let kinematic_acceleration = norm([force_north - north, force_east - east]);
+        let level = (norm([north, east]) - HEADING_PART * kinematic_acceleration)
             .max((specific_force - kinematic_acceleration).abs());
-        Some(norm([level, down, 0.0]) - LATE_S * norm(changes))
+        Some(norm([level, down]) - LATE_S * norm(changes))
     }
 
     pub(crate) fn residual(&self, now: BootMs) -> Option<Reading> {

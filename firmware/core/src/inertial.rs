@@ -221,7 +221,7 @@ impl Inertial {
     pub fn lies_over(&self, now: BootMs) -> Option<f32> {
         let lasts = self.over_since.age(now).is_some_and(|age| age >= LIES) && self.is_fresh(now);
         let [x, y, z] = self.force;
-        lasts.then(|| libm::atan2f(libm::sqrtf(x * x + y * y), -z))
+        lasts.then(|| libm::atan2f(norm([x, y]), -z))
     }
 }
 

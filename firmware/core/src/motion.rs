@@ -2,7 +2,7 @@
 
 use crate::observation::Hud;
 use crate::time::{BootMs, Millis, PAUSE};
-use crate::units::MetresPerSecond;
+use crate::units::{MetresPerSecond, norm};
 use crate::vehicle::Vehicle;
 
 /// Positions and speeds older than this decide nothing.
@@ -52,7 +52,7 @@ pub(crate) fn climb_within(now: BootMs, vehicle: &Vehicle, age: Millis) -> Optio
 
 /// Speed over ground from the best source that is fresh, in m/s.
 pub fn ground_speed_mps(now: BootMs, vehicle: &Vehicle) -> Option<f32> {
-    let level = |[north, east, _]: [MetresPerSecond; 3]| libm::sqrtf(north.0 * north.0 + east.0 * east.0);
+    let level = |[north, east, _]: [MetresPerSecond; 3]| norm([north.0, east.0]);
     let global = vehicle.global.within(now, MOTION_AGE).map(|global| level(global.velocity));
     let local = || vehicle.local.within(now, MOTION_AGE).map(|local| level(local.velocity));
     let hud = || displayed(now, vehicle, |hud| Some(hud.groundspeed?.0));

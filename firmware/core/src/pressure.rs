@@ -87,10 +87,8 @@ impl Pressure {
     pub(crate) fn follows(&self, now: BootMs, climb_mps: f32) -> Option<bool> {
         let least_m = (SHOWN_S * libm::fabsf(climb_mps)).max(NOISE_M);
         self.now(now).filter(|_| self.before_hpa > 0.0)?;
-        Some(
-            libm::copysignf(self.rise_m(self.before_hpa), 1.0) > least_m
-                && self.rise_m(self.before_hpa) * climb_mps > 0.0,
-        )
+        let rise_m = self.rise_m(self.before_hpa);
+        Some(libm::fabsf(rise_m) > least_m && rise_m * climb_mps > 0.0)
     }
 }
 

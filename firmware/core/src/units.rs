@@ -70,6 +70,6 @@ pub struct Position {
 }
 
 /// How long a vector is.
-pub fn norm([x, y, z]: [f32; 3]) -> f32 {
-    libm::sqrtf(x * x + y * y + z * z)
+pub fn norm<const N: usize>(vector: [f32; N]) -> f32 {
+    libm::sqrtf(vector.iter().map(|part| part * part).sum())
 }

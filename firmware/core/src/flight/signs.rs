@@ -315,7 +315,7 @@ impl Flight {
         else {
             return;
         };
-        let speed_mps = libm::sqrtf(climb_mps * climb_mps + ground_mps * ground_mps);
+        let speed_mps = norm([climb_mps, ground_mps]);
         if let Some(shock) = &mut self.shock
             && at.since(shock.at) <= BREAKS_OFF
         {

@@ -163,10 +163,6 @@ impl Role {
         (self.0 >> Self::SETS) as u8
     }
 
-    pub(super) const fn is(self, group: Group) -> bool {
-        self.number() == group as u8
-    }
-
     pub(super) const fn is_of(self, groups: u64) -> bool {
         groups >> self.number() & 1 != 0
     }
@@ -234,7 +230,7 @@ impl Alarm {
         let (before, after) = (effect.since.since(self.since), self.since.since(effect.since));
         match effect.level {
             Level::Ok | Level::Advisory => false,
-            Level::Stale => self.check.role.is(Group::Silence) && after <= NEAR,
+            Level::Stale => self.check.role.is_of(Group::Silence.bit()) && after <= NEAR,
             level if (self.level as u8) < level as u8 => false,
             _ if self.check.subsystem == Subsystem::Mishap => {
                 is_of_mishap(effect.check.subsystem) && is_with_mishap(effect.since, self.since)
@@ -358,7 +354,7 @@ mod tests {
         let wire = check_of(slot_of("esc_silent", 0).unwrap()).unwrap().0;
         for check in checks().filter(|check| explains(wire, check)) {
             assert!(!matches!(check.subsystem, Subsystem::Attitude | Subsystem::Mishap), "{}", check.name);
-            assert!(!check.role.is(Group::Failsafe) && check.name != "autopilot_state");
+            assert!(!check.role.is_of(Group::Failsafe.bit()) && check.name != "autopilot_state");
         }
     }
 }

@@ -123,7 +123,7 @@ fn is_due(px4: &mut Px4, sample: &Sample<'_>) -> bool {
         px4.motion.force_us = Some(now_us);
         return true;
     }
-    if let Some(force) = sample.fields.vector(0).map(norm).filter(|force| *force > SHOCK_MIN) {
+    if let Some(force) = sample.fields.vector(0).map(norm::<3>).filter(|force| *force > SHOCK_MIN) {
         px4.observe(Observation::Shock(MetresPerSecond2(force)));
     }
     false
