@@ -10,6 +10,7 @@ use hums::source::{self, Chunk, Timing};
 use hums_core::health::{self, Level, Subsystem};
 use hums_core::parameters::Params;
 use hums_link::packet::Fields;
+use hums_link::vocabulary;
 use hums_link::{Check, Frame};
 use hums_tests::flights::{self, OWN, own, root};
 use rayon::prelude::*;
@@ -68,7 +69,7 @@ fn family(text: &str) -> Subsystem {
         return Subsystem::Mishap;
     }
     let fits = |name: &str| {
-        let said = health::said(name).unwrap();
+        let said = vocabulary::said(name).unwrap();
         if let Some(silent) = words.strip_prefix("no data: ") {
             return silent.starts_with(&said.name_of(0).to_string())
                 || (1..9).any(|n| silent == said.name_of(n).to_string());
@@ -78,7 +79,7 @@ fn family(text: &str) -> Subsystem {
         words.starts_with(before) && words.contains(after)
     };
     let found = health::checks().filter(|check| fits(check.name));
-    let longest = found.max_by_key(|check| health::said(check.name).unwrap().alarm.len());
+    let longest = found.max_by_key(|check| vocabulary::said(check.name).unwrap().alarm.len());
     match longest.unwrap_or_else(|| panic!("of which check is {text}?")).subsystem {
         Subsystem::Attitude => Subsystem::Propulsion,
         part => part,

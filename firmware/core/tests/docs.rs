@@ -7,9 +7,10 @@ use std::fs;
 use std::path::PathBuf;
 
 use hums_core::exposure;
-use hums_core::health::{Check, CheckPhase, RadioWords, Side, VOCABULARY, Words, checks};
+use hums_core::health::{Check, CheckPhase, Side, checks};
 use hums_core::parameters::{Param, Params, TABLE};
 use hums_core::time::Millis;
+use hums_link::vocabulary::{RadioWords, VOCABULARY, Words};
 
 /// The inputs of each check, and the source of its limits unless a parameter is.
 const INPUTS: &str = include_str!("inputs.txt");

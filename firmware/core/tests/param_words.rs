@@ -2,8 +2,9 @@
 
 use core::fmt;
 
-use hums_core::health::{Check, Side, checks, vocabulary};
+use hums_core::health::{Check, Side, checks};
 use hums_core::parameters::Param;
+use hums_link::vocabulary::vocabulary;
 
 /// Decimal places that a quantity is shown with.
 pub const DECIMAL_PLACES: u8 = 3;

@@ -22,6 +22,7 @@ pub mod signing;
 pub mod statustext;
 pub mod summary;
 mod telling;
+pub mod vocabulary;
 
 pub use frame::{Check, Frame};
 pub use framer::{Framer, FramerCounts};

@@ -25,6 +25,7 @@ use crate::outlet::{Class, Outlet};
 use crate::packet::Packet;
 use crate::statustext::{Severity, TEXT_BYTES_MAX, Text};
 use crate::telling::{self, SendTime, SentFindings, order};
+use crate::vocabulary;
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
 const FORWARDED: &[(u32, u16)] = &[
@@ -457,7 +458,7 @@ pub fn text(finding: &Finding) -> Text {
 #[inline(never)]
 fn words(finding: &Finding, orders: &Finding, revises: bool) -> Text {
     let Finding { check, instance, level, value, feeds, .. } = *finding;
-    let Some(said) = health::said(check) else { return Text::new(format_args!("HUMS: {check}")) };
+    let Some(said) = vocabulary::said(check) else { return Text::new(format_args!("HUMS: {check}")) };
     match level {
         Level::Ok => return Text::new(format_args!("HUMS: over: {}", said.alarm_of(instance, feeds))),
         Level::Stale => return Text::new(format_args!("HUMS: no data: {}", said.name_of(instance))),

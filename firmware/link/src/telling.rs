@@ -30,6 +30,8 @@ use core::iter;
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{self, Alarm, Check, Finding, Health, Level, Subsystem, root_cause};
 
+use crate::vocabulary::said;
+
 const EVENT: Span = Span::from_secs(10);
 /// Time that a warning waits in case it becomes critical.
 const HOLD: Span = Span::from_secs(1);
@@ -259,7 +261,7 @@ fn key(finding: &Finding) -> Option<(u8, u8)> {
 
 /// Empty if none.
 pub(crate) fn order(finding: &Finding) -> &'static str {
-    health::said(finding.ordering()).map_or("", |said| said.advice)
+    said(finding.ordering()).map_or("", |said| said.advice)
 }
 
 fn check_of(number: u8) -> Option<&'static Check> {
@@ -271,5 +273,5 @@ fn part(number: u8) -> Option<Subsystem> {
 }
 
 fn advice(number: u8) -> &'static str {
-    check_of(number).and_then(|check| health::said(check.name)).map_or("", |said| said.advice)
+    check_of(number).and_then(|check| said(check.name)).map_or("", |said| said.advice)
 }

@@ -4,11 +4,11 @@ use std::borrow::Cow;
 
 use hums_core::exposure::{BINS, ExposureQuantity};
 use hums_core::figures::Quantity;
-use hums_core::health::{self, Words};
 use hums_core::observation::MOTORS_MAX;
 use hums_core::usage::{
     EXPOSURE_FIRST, FIGURE_FIRST, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter,
 };
+use hums_link::vocabulary::{self, Words};
 
 use crate::trend_words::WORDS;
 
@@ -23,7 +23,7 @@ pub fn message_name(id: u32) -> Cow<'static, str> {
 /// The board's, or trends'.
 pub fn vocabulary(check: &str) -> Option<&'static Words> {
     let of_trends = || WORDS.iter().find(|words| words.said.check == check);
-    health::vocabulary(check).or_else(of_trends)
+    vocabulary::vocabulary(check).or_else(of_trends)
 }
 
 /// The fault that a check finds, in the words of radio texts: `battery 1, 2 cell low`; of any part, `battery cell low`.

@@ -1,6 +1,6 @@
 //! Words of trends over flights, which no box judges.
 
-use hums_core::health::{RadioWords, Scope, Words};
+use hums_link::vocabulary::{RadioWords, Scope, Words};
 
 /// Name for people, part, meaning, action, input.
 const fn words(

@@ -11,12 +11,13 @@ use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
 use hums_core::happening::Happening;
 use hums_core::health::exceedance::Exceedance;
-use hums_core::health::{Finding, Level, Scope, Subsystem, VOCABULARY};
+use hums_core::health::{Finding, Level, Subsystem};
 use hums_core::observation::{Autopilot, Observation, Source};
 use hums_core::parameters::Params;
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::usage::UsageCounter;
 use hums_link::sequence::Sequences;
+use hums_link::vocabulary::{Scope, VOCABULARY};
 use hums_link::{Check, Frame, observe};
 
 use super::companion::Companion;

@@ -21,7 +21,6 @@ mod recorder;
 mod structure;
 mod suppression;
 mod tables;
-mod vocabulary;
 
 pub use check::{
     CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, CheckPhase, InstanceKind, Limits, Side, State, Unit,
@@ -31,7 +30,6 @@ pub use finding::{Finding, Level, Orders, Subsystem};
 pub use inputs::Inputs;
 pub use suppression::{Alarm, Role, explains, is_of_mishap, is_with_mishap, root_cause};
 pub use tables::{check_named, checks, instances};
-pub use vocabulary::{RadioWords, Scope, VOCABULARY, Words, said, vocabulary};
 
 use crate::latest::Reading;
 use crate::parameters::Param;

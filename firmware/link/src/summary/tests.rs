@@ -149,7 +149,7 @@ fn a_value_says_what_it_is_of_or_is_not_told() {
 #[test]
 fn no_text_is_cut_whatever_part_and_level() {
     for check in health::checks() {
-        let advice = health::said(check.name).map_or("", |said| said.advice);
+        let advice = vocabulary::said(check.name).map_or("", |said| said.advice);
         for (level, feeds) in
             Level::ALL.into_iter().flat_map(|level| [(level, Feeds::Vehicle), (level, Feeds::Avionics)])
         {
@@ -163,7 +163,7 @@ fn no_text_is_cut_whatever_part_and_level() {
             };
             let told = text(&finding);
             let told = told.as_str();
-            let around = health::said(check.name).and_then(|said| said.around_value(check.unit.name()));
+            let around = vocabulary::said(check.name).and_then(|said| said.around_value(check.unit.name()));
             let value =
                 around.filter(|_| feeds != Feeds::Avionics).map_or_else(String::new, |(before, after)| {
                     format!(": {before}{}{after}", quantity(finding.value, check.unit.name()).as_str())
@@ -175,7 +175,7 @@ fn no_text_is_cut_whatever_part_and_level() {
             };
             assert!(told.len() <= TEXT_BYTES_MAX && told.ends_with(end), "{told}");
             assert!(!told.contains(['|', '~', '#']), "{told}");
-            let said = health::said(check.name).expect("its words");
+            let said = vocabulary::said(check.name).expect("its words");
             let whole = match level {
                 Level::Ok => said.alarm_of(finding.instance, feeds).to_string(),
                 Level::Stale => said.name_of(finding.instance).to_string(),

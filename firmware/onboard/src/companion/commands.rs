@@ -15,7 +15,7 @@ use hums_blackbox::record::Boot;
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
 use hums_core::component::Label;
-use hums_core::health::{self, Level};
+use hums_core::health::Level;
 use hums_core::observation::{CommandAck, Feeds};
 use hums_core::parameters::TABLE;
 use hums_link::ids;
@@ -29,6 +29,7 @@ use hums_link::packet::Packet;
 use hums_link::request::{Port, Replies, Reply};
 use hums_link::statustext::{Severity, Text};
 use hums_link::summary;
+use hums_link::vocabulary;
 use hums_recorder::CardState;
 
 use super::library::builtin::{self, BuiltinFile};
@@ -245,7 +246,7 @@ fn preflight(monitor: &Monitor) -> Option<(&'static str, u8)> {
 
 #[inline(never)]
 fn not_ready(check: &str, part: u8) -> Text {
-    match health::said(check) {
+    match vocabulary::said(check) {
         Some(said) => Text::new(format_args!("HUMS: not ready: {}", said.alarm_of(part, Feeds::Unsaid))),
         None => Text::new(format_args!("HUMS: not ready: {check}")),
     }

@@ -2,11 +2,12 @@
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{Check, CheckPhase, Level, Scope, Side, VOCABULARY, checks, vocabulary};
+use hums_core::health::{Check, CheckPhase, Level, Side, checks};
 use hums_core::observation::{Autopilot, Gnss, Heartbeat};
 use hums_core::parameters::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_formats::trend_words::WORDS;
+use hums_link::vocabulary::{Scope, VOCABULARY, vocabulary};
 
 use super::judged::JudgedBy;
 use super::problem::Problem;

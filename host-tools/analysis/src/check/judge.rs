@@ -12,7 +12,7 @@ use hums_core::cause::{Alert, Cause};
 use hums_core::clock::{Instant, Span};
 use hums_core::flight::{Flight as FlightState, Phase};
 use hums_core::happening::Happening;
-use hums_core::health::{Level, Scope};
+use hums_core::health::Level;
 use hums_core::motion::{climb_mps, ground_speed_mps, height_m};
 use hums_core::observation::{Estimator, LandedState, Observation, Source, SystemStatus, VehicleKind};
 use hums_core::parameters::Params;
@@ -20,6 +20,7 @@ use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::usage::UsageCounter;
 use hums_core::vehicle::Vehicle;
 use hums_link::sequence::Sequences;
+use hums_link::vocabulary::Scope;
 use hums_onboard::monitoring::TICK;
 
 use super::cells::Cells;

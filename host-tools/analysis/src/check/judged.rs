@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{Level, Scope, Subsystem, check_named};
+use hums_core::health::{Level, Subsystem, check_named};
 use hums_core::vehicle::Vehicle;
+use hums_link::vocabulary::Scope;
 
 use super::coverage::OFF;
 use super::flights::{Flight, begin_in_air};

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use hums_core::Monitor;
 use hums_core::clock::Instant;
-use hums_core::health::{self, Level, said};
+use hums_core::health::{self, Level};
 use hums_core::parameters::Params;
 use hums_link::summary::Summary;
+use hums_link::vocabulary::said;
 use hums_link::{Check, Frame, ids};
 
 /// The severity of a critical text.

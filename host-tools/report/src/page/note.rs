@@ -2,10 +2,11 @@
 
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
-use hums_core::health::{Finding, RadioWords, VOCABULARY, instances};
+use hums_core::health::{Finding, instances};
 use hums_core::observation::{Feeds, MOTORS_MAX};
 use hums_formats::trend_words::WORDS;
 use hums_link::encode::COMPONENT;
+use hums_link::vocabulary::{RadioWords, VOCABULARY};
 use serde::Serialize;
 
 use crate::names::{check_name, unit_name, vocabulary};

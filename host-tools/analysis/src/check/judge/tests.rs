@@ -2,13 +2,14 @@
 
 use hums_blackbox::Record;
 use hums_blackbox::record::{FindingRecord, Moment, Parameter, Usage};
-use hums_core::health::{Level, VOCABULARY, Words};
+use hums_core::health::Level;
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VtolState,
 };
 use hums_core::parameters::Param;
 use hums_core::units::{Fraction, Rpm, Volts};
 use hums_formats::trend_words::WORDS;
+use hums_link::vocabulary::{VOCABULARY, Words};
 
 use super::*;
 use crate::check::flights::Flight;

@@ -6,7 +6,7 @@
 
 use core::fmt;
 
-use crate::observation::Feeds;
+use hums_core::observation::Feeds;
 
 /// The source that a check is judged from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub enum Scope {
 /// The words of a check in radio texts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RadioWords {
-    /// The check: [`super::Check::name`].
+    /// The check: [`hums_core::health::Check::name`].
     pub check: &'static str,
     /// Its name for people: the value, not the fault.
     pub name: &'static str,
@@ -428,8 +428,9 @@ vocabulary! {
 
 #[cfg(test)]
 mod tests {
+    use hums_core::health::{check_named, checks, instances};
+
     use super::*;
-    use crate::health::checks;
 
     #[test]
     fn every_check_has_its_words_in_the_order_of_the_tables() {
@@ -448,7 +449,7 @@ mod tests {
                 let first = sentence.chars().next().is_some_and(char::is_uppercase);
                 assert!(first && sentence.ends_with('.') && sentence.len() <= 100, "{check}: {sentence}");
             }
-            let several = crate::health::instances(check) > 1;
+            let several = instances(check) > 1;
             assert_eq!(several, !part.is_empty(), "{check}");
             assert!(name.starts_with(part), "{check}: the number of the part goes after its word");
             assert!(!name.is_empty() && !words.needs.is_empty(), "{check}");
@@ -463,8 +464,7 @@ mod tests {
             assert!(!alarm.is_empty() && alarm.is_ascii() && advice.is_ascii(), "{check}");
             assert_eq!(alarm.contains('#'), !part.is_empty(), "{check}: {alarm}");
             assert!(alarm.matches('#').count() <= 1, "{check}: {alarm}");
-            let is_critical =
-                crate::health::check_named(check).is_some_and(|check| check.limits.critical.is_some());
+            let is_critical = check_named(check).is_some_and(|check| check.limits.critical.is_some());
             assert_eq!(is_critical, !advice.is_empty(), "{check}: {advice}");
             let other = VOCABULARY[..index].iter().find(|other| other.said.alarm == alarm);
             assert_eq!(other.is_some(), twins.contains(&check), "{check}: {alarm}");
