@@ -36,19 +36,23 @@ fn compare(recording: &Path) {
     assert!(found["points"].as_u64() > found["messages"].as_u64(), "{name}: {found}");
 }
 
-/// The first frames of each id: pymavlink needs seconds for some ten thousand.
+/// Frames of each id from all of the flight: pymavlink needs seconds for some ten thousand.
 fn thinned(name: &str, dir: &Path) -> PathBuf {
     const OF_AN_ID: usize = 250;
     let (path, data, manifest) = (own(name), fs::read(own(name)).unwrap(), Manifest::own());
-    let mut counts = BTreeMap::<u32, usize>::new();
+    let frames = manifest.frames_of(&path, &data);
+    let (mut all, mut seen) = (BTreeMap::<u32, usize>::new(), BTreeMap::<u32, usize>::new());
+    for frame in &frames {
+        *all.entry(frame.id).or_default() += 1;
+    }
     let mut thin = Vec::new();
-    for frame in manifest.frames_of(&path, &data) {
-        let count = counts.entry(frame.id).or_default();
-        *count += 1;
-        if *count <= OF_AN_ID {
+    for frame in frames {
+        let number = seen.entry(frame.id).or_default();
+        if number.is_multiple_of(all[&frame.id].div_ceil(OF_AN_ID)) {
             thin.extend(frame.time_us.into_iter().flat_map(u64::to_be_bytes));
             thin.extend(frame.bytes);
         }
+        *number += 1;
     }
     let thinned = dir.join(name);
     fs::write(&thinned, thin).unwrap();

@@ -426,24 +426,29 @@ fn no_cable_and_no_other_command_stops_a_record() {
     assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
 }
 
+type Host = fn(&mut Rig);
+
 /// The hosts follow each other at one board.
 #[test]
 fn whatever_a_host_does_the_next_one_gets_the_card() {
     let (mut rig, resets) = reading();
     let (card, writes) = (rig.medium.content(), rig.medium.writes());
-    for host in [
-        misbehaves_and_gets_the_card,
-        finds_the_card_pulled_and_back,
-        gives_up_control_transfers,
-        configures_anew_without_a_reset,
-        does_anything_and_attaches,
-    ] {
+    let hosts: [(&str, Host); 5] = [
+        ("misbehaves", misbehaves_and_gets_the_card),
+        ("finds the card pulled", finds_the_card_pulled_and_back),
+        ("gives up transfers", gives_up_control_transfers),
+        ("configures anew", configures_anew_without_a_reset),
+        ("does anything", does_anything_and_attaches),
+    ];
+    for (name, host) in hosts {
+        println!("a host that {name}");
         host(&mut rig);
         rig.machine.unplug();
         rig.run(rig.machine.now() + 500 * MS, false).unwrap();
-        assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
+        assert_eq!(rig.machine.resets.len(), resets, "{name}: {:?}", rig.machine.resets);
+        let is_same = rig.medium.content() == card && rig.medium.writes() == writes;
+        assert!(is_same, "{name}: the card was written");
     }
-    assert!(rig.medium.content() == card && rig.medium.writes() == writes, "the card was written");
 }
 
 fn misbehaves_and_gets_the_card(rig: &mut Rig) {

@@ -65,7 +65,7 @@ def main():
         sys.exit(__doc__)
     options = webdriver.ChromeOptions()
     options.binary_location = sys.argv[1]
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     with tempfile.TemporaryDirectory() as profile:
         for flag in [*FLAGS, f"--user-data-dir={profile}"]:
             options.add_argument(flag)
@@ -90,7 +90,10 @@ def step(driver, asked):
         driver.close()
         driver.switch_to.window(tab)
         driver.execute_cdp_cmd("Storage.clearDataForOrigin", {"origin": "*", "storageTypes": "all"})
-        driver.get_log("browser")
+        driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "deny"})
+        driver.execute_cdp_cmd("Network.clearBrowserCache", {})
+        for kind in ["browser", "performance"]:
+            driver.get_log(kind)
         return None
     if do == "look":
         return report.look(driver, asked["page"], asked["parts"])

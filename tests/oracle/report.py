@@ -17,6 +17,8 @@
 The mouse points at each of `parts`: how far from the left in each plot, 0 to 1.
 """
 
+import json
+
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.support.ui import WebDriverWait
 
@@ -99,7 +101,8 @@ def point(driver, plot, part, time_range):
 def look(driver, page, parts):
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
                            {"width": 1280, "height": 1000, "deviceScaleFactor": 1, "mobile": False})
-    driver.get(f"file://{page}")
+    address = f"file://{page}"
+    driver.get(address)
     WebDriverWait(driver, 60).until(
         lambda driver: driver.execute_script("return document.documentElement.dataset.ready") == "true")
     # Plots that never change fold away; the mouse points at each.
@@ -135,7 +138,10 @@ def look(driver, page, parts):
         lambda driver: driver.execute_script("return document.querySelector('.plot .uplot')?.clientWidth ?? 0") < 390)
     shown["width"] = driver.execute_script("return [document.documentElement.scrollWidth, innerWidth]")
     shown["console"] = [entry["message"] for entry in driver.get_log("browser")]
-    asked = driver.execute_script("return performance.getEntriesByType('resource').map(({ name }) => name)")
-    shown["requests"] = [url for url in asked if not url.startswith("data:")]
+    events = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
+    # The browser's own first tab makes requests too.
+    asked = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
+    urls = {request["request"]["url"] for request in asked if request["documentURL"] == address}
+    shown["requests"] = sorted(url for url in urls if url != address and not url.startswith("data:"))
     return shown
 

@@ -19,7 +19,7 @@ const BUDGETS: [u32; 3] = [100, 1_000, 5_000];
 const BAUD: u64 = 57_600;
 const SECOND: u64 = 1_000_000;
 
-/// The first byte's time, microseconds, to a step.
+/// The first byte's time, microseconds, to a millisecond.
 struct Sent {
     at_us: u64,
     bytes: Vec<u8>,
@@ -36,7 +36,7 @@ impl Sent {
 }
 
 /// `ask` returns the ground station's bytes for each 100 ms.
-fn chunks(recording: &Path, step_us: u64, mut ask: impl FnMut(u64) -> Vec<u8>) -> Vec<(Side, Chunk)> {
+fn chunks(recording: &Path, mut ask: impl FnMut(u64) -> Vec<u8>) -> Vec<(Side, Chunk)> {
     let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
     let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
     let (mut chunks, mut now_us) = (Vec::new(), 0);
@@ -48,19 +48,14 @@ fn chunks(recording: &Path, step_us: u64, mut ask: impl FnMut(u64) -> Vec<u8>) -
                 (Side::Autopilot, Vec::new())
             };
             chunks.push((side, Chunk { at_us: now_us, bytes }));
-            now_us += step_us;
+            now_us += 1_000;
         }
         chunks.push((Side::Autopilot, chunk));
     }
     chunks
 }
 
-fn power_on(
-    recording: &Path,
-    budget: u32,
-    step_us: u64,
-    ask: impl FnMut(u64) -> Vec<u8>,
-) -> (Outcome, Vec<Sent>) {
+fn power_on(recording: &Path, budget: u32, ask: impl FnMut(u64) -> Vec<u8>) -> (Outcome, Vec<Sent>) {
     let dir = tempfile::tempdir().unwrap();
     let file = image::open_or_make(&dir.path().join("card.img"), Some(256), |_| Ok(())).unwrap();
     let card = SimCard::new(file, Faults::default()).unwrap();
@@ -69,7 +64,7 @@ fn power_on(
     params.set("GS_BUDGET", budget as f32).unwrap();
     let board = BoardSetup { card: &card, params: &params, key: None };
     let mut sent = Vec::new();
-    let outcome = run(&board, chunks(recording, step_us, ask), |side, at_us, bytes| {
+    let outcome = run(&board, chunks(recording, ask), |side, at_us, bytes| {
         if side == Side::Ground {
             sent.push(Sent { at_us, bytes: bytes.to_vec() });
         }
@@ -77,12 +72,11 @@ fn power_on(
     (outcome.unwrap(), sent)
 }
 
-/// A frame began within the step before.
-fn fullest_second(sent: &[Sent], step_us: u64) -> usize {
+fn fullest_second(sent: &[Sent]) -> usize {
     let (mut first, mut bytes, mut most) = (0, 0, 0);
     for (index, frame) in sent.iter().enumerate() {
         bytes += frame.bytes.len();
-        while sent[index].at_us - sent[first].at_us >= SECOND - step_us {
+        while sent[index].at_us - sent[first].at_us >= SECOND {
             bytes -= sent[first].bytes.len();
             first += 1;
         }
@@ -94,11 +88,10 @@ fn fullest_second(sent: &[Sent], step_us: u64) -> usize {
 /// One recording of each autopilot: all exceed any budget.
 #[test]
 fn no_second_holds_more_than_the_budget_and_nothing_starves() {
-    const STEP_US: u64 = 5_000;
     for recording in ["px4_hil_quad_low.tlog", "ap_quad_signed.raw"].map(own) {
         for budget in BUDGETS {
-            let (outcome, sent) = power_on(&recording, budget, STEP_US, |_| Vec::new());
-            let most = fullest_second(&sent, STEP_US);
+            let (outcome, sent) = power_on(&recording, budget, |_| Vec::new());
+            let most = fullest_second(&sent);
             let name = recording.display();
             println!("{name}: {most} of {budget} B/s at most, {} frames", sent.len());
             assert!(most <= budget as usize, "{name}: {most} bytes in a second of {budget}");
@@ -148,11 +141,10 @@ fn greedy(now_us: u64) -> Vec<u8> {
 
 #[test]
 fn a_critical_finding_is_out_within_fifty_milliseconds_however_busy_the_port_is() {
-    const STEP_US: u64 = 2_000;
     let motor = root().join("tests/labelled/f01_motor_dead_hexa.tlog.gz");
-    for recording in [motor, own("ap_quad_faults.tlog")] {
-        let (outcome, sent) = power_on(&recording, 5_000, STEP_US, greedy);
-        let most = fullest_second(&sent, STEP_US);
+    for recording in [motor, own("ap_quad_faults.tlog"), own("px4_hil_quad_low.tlog")] {
+        let (outcome, sent) = power_on(&recording, 5_000, greedy);
+        let most = fullest_second(&sent);
         assert!(most <= 5_000, "{}: {most} bytes in a second", recording.display());
         assert_eq!(outcome.done.stats.frames_lost, 0, "{}", recording.display());
         let ours = || sent.iter().filter(|sent| sent.frame().id() == 253 && sent.frame().component() == 191);
@@ -167,7 +159,6 @@ fn a_critical_finding_is_out_within_fifty_milliseconds_however_busy_the_port_is(
             .filter(|finding| finding.level == Level::Critical)
             .map(|finding| finding.at.as_micros())
             .collect();
-        assert!(!critical.is_empty(), "{}", recording.display());
         // An explained finding has no text.
         assert!(texts.len() <= critical.len(), "{}", recording.display());
         assert_eq!(texts.is_empty(), critical.is_empty(), "{}", recording.display());

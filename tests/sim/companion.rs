@@ -261,12 +261,15 @@ fn a_box_that_restarts_in_the_air_reads_no_parameters() {
     let record = |further: &[&str], codes: &[i32]| {
         let input = flight.as_os_str();
         let command = ["sim".as_ref(), input, "--sd".as_ref(), image.as_os_str()];
-        hums(command.into_iter().chain(further.iter().map(AsRef::as_ref))).expect_code(codes);
+        hums(command.into_iter().chain(further.iter().map(AsRef::as_ref))).expect_code(codes)
     };
     record(&[], &[0]);
     put_parameters(&image, "PROT_ACTION 1\nBAT_REM_WARN 31\n");
     // Input while the power is off is lost.
-    record(&["--reboot-at", "60"], &[3]);
+    let said = record(&["--json", "--reboot-at", "60"], &[3]).text();
+    let said: Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(said["log_files"].as_array().map(Vec::len), Some(2), "{said}");
+    assert!(said["frames_lost"].as_u64() < Some(150), "{said}");
     let out = dir.path().join("out");
     hums_with("decode {} -o {} --format jsonl", &[&image, &out]).expect_code(&[0, 3]);
     let mut sessions: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).collect();

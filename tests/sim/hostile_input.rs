@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use hums_tests::damage::Random;
 use hums_tests::flights::{Manifest, own};
-use hums_tests::program::{Machine, Recording, hums, hums_with};
+use hums_tests::program::{Decoded, Machine, Recording, hums, hums_with};
 
 /// KiB, for any input.
 const MEMORY_KIB_MAX: u64 = 60 << 10;
@@ -28,6 +28,16 @@ fn assert_refused(file: &Path) {
     let dir = tempfile::tempdir().unwrap();
     for arguments in readers(file, &dir.path().join("out")) {
         let outcome = hums(&arguments).expect_clear_failure();
+        assert!(outcome.memory_kib_max < MEMORY_KIB_MAX, "{arguments:?} took {} KiB", outcome.memory_kib_max);
+    }
+}
+
+/// An exit code of the contract, without a panic.
+#[track_caller]
+fn assert_survived(file: &Path) {
+    let dir = tempfile::tempdir().unwrap();
+    for arguments in readers(file, &dir.path().join("out")) {
+        let outcome = hums(&arguments).expect_code(&[0, 1, 3]);
         assert!(outcome.memory_kib_max < MEMORY_KIB_MAX, "{arguments:?} took {} KiB", outcome.memory_kib_max);
     }
 }
@@ -82,13 +92,48 @@ fn a_truncated_recording_gives_all_but_its_last_frame() {
     }
 }
 
+/// Noise over FAT, directory and log at once, and a cut.
+#[test]
+fn a_damaged_and_a_truncated_image_are_survived_and_give_no_wrong_frame() {
+    let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
+    let manifest = Manifest::own();
+    let whole = recording.decode(&[0]);
+    let whole = whole.frames(&manifest.seeds);
+    let good = fs::read(recording.image()).unwrap();
+    let is_used = |at: &usize| good[*at..*at + 512] != [0; 512];
+    let used: Vec<usize> = (0..good.len()).step_by(512).filter(is_used).collect();
+    let (mut damaged, mut random) = (good.clone(), Random::new(12));
+    for _ in 0..8 {
+        let at = used[random.below(used.len() as u64) as usize] + random.below(512) as usize;
+        let length = 1 + random.below(600) as usize;
+        let noise = random.bytes(length);
+        damaged[at..at + noise.len()].copy_from_slice(&noise);
+    }
+    let middle = used[used.len() / 2];
+    let dir = tempfile::tempdir().unwrap();
+    for (name, bytes) in [("damaged.img", &damaged[..]), ("cut.img", &good[..middle + 100])] {
+        let file = dir.path().join(name);
+        fs::write(&file, bytes).unwrap();
+        assert_survived(&file);
+        let mut originals = whole.iter();
+        for frame in Decoded::of(&file, &[0, 1, 3]).frames(&manifest.seeds) {
+            let is_original = originals.any(|original| original.bytes == frame.bytes);
+            assert!(is_original, "{name}: a frame that never was: {frame:02x?}");
+        }
+    }
+}
+
 #[test]
 fn what_is_no_log_is_refused_in_little_memory_also_if_it_is_enormous() {
     let dir = tempfile::tempdir().unwrap();
     for length in [0, 1, 511, 512, 4096] {
         assert_refused(&sparse(dir.path().join(format!("short-{length}")), length));
     }
-    assert_refused(&sparse(dir.path().join("enormous.img"), 1 << 30));
+    assert_refused(&sparse(dir.path().join("large.img"), 1 << 30));
+    // More bytes than 32 bits count.
+    let enormous = sparse(dir.path().join("enormous.img"), (4 << 30) + 512);
+    let outcome = hums_with("info {}", &[&enormous]).expect_clear_failure();
+    assert!(outcome.memory_kib_max < MEMORY_KIB_MAX, "{} KiB", outcome.memory_kib_max);
     let garbage = dir.path().join("garbage.img");
     fs::write(&garbage, Random::new(5).bytes(5_000_000)).unwrap();
     assert_refused(&garbage);

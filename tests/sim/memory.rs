@@ -1,6 +1,6 @@
 //! No input makes a command take more than 64 MiB above an empty run. Commands and formats come from their definitions: a new
-//! one is tested, or fails the tests. One worker; `docs/decode.md` has the figure for more. The inputs are larger than the
-//! limit.
+//! one is tested, or fails the tests. One worker; `docs/decode.md` has the figure for more. Most inputs are
+//! larger than the limit.
 
 use std::fs;
 use std::path::Path;

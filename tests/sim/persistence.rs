@@ -230,8 +230,8 @@ fn a_parameter_file_that_is_wrong_is_told_with_line_and_range_and_leaves_nothing
         ("\nNO_SUCH 1\n", "line 2: there is no parameter NO_SUCH"),
         ("CELL_VOLT_WARN 3.6\nCELL_VOLT_CRIT,12\n", "line 2: CELL_VOLT_CRIT takes 0 to 4.5 V, not 12"),
         ("CELL_VOLT_WARN\n", "line 1: wants NAME VALUE"),
-        ("VIBE_WARN x\n", "line 1"),
-        ("VIBE_WARN 1 2\n", "line 1"),
+        ("VIBE_WARN x\n", "line 1: VIBE_WARN takes "),
+        ("VIBE_WARN 1 2\n", "line 1: wants NAME VALUE"),
     ] {
         fs::write(&file, text).unwrap();
         for flags in [&[][..], &["--firmware", "hums.elf"]] {

@@ -7,6 +7,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use rustix::fs::{SeekFrom as Place, seek};
+use rustix::io::Errno;
 
 use crate::child;
 
@@ -94,9 +95,12 @@ pub(crate) fn extract(image: &Path, to: &Path) -> u64 {
     let mut out = File::create(to).unwrap();
     out.set_len(length).unwrap();
     let (mut at, end) = (start, start + length);
-    while let Ok(data) = seek(&from, Place::Data(at))
-        && data < end
-    {
+    loop {
+        let data = match seek(&from, Place::Data(at)) {
+            Ok(data) if data < end => data,
+            Ok(_) | Err(Errno::NXIO) => break,
+            Err(why) => panic!("{}: {why}", image.display()),
+        };
         at = seek(&from, Place::Hole(data)).unwrap().min(end);
         from.seek(SeekFrom::Start(data)).unwrap();
         out.seek(SeekFrom::Start(data - start)).unwrap();

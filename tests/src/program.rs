@@ -87,15 +87,21 @@ pub fn hums<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Outcome 
     child::run(&mut command(arguments), LIMIT)
 }
 
-/// Runs `hums` with these words; each `{}` is the next one of these paths.
+/// Runs `hums` with these words; each `{}` is the next one of these values.
+///
+/// # Panics
+///
+/// There are more or fewer values.
 #[track_caller]
-pub fn hums_with(words: &str, paths: &[&dyn AsRef<OsStr>]) -> Outcome {
-    let mut paths = paths.iter();
+pub fn hums_with(words: &str, values: &[&dyn AsRef<OsStr>]) -> Outcome {
+    let mut values = values.iter();
     let word = |word| match word {
-        "{}" => (*paths.next().expect("a path for each {}")).as_ref(),
+        "{}" => (*values.next().expect("a value for each {}")).as_ref(),
         word => OsStr::new(word),
     };
-    hums(words.split(' ').map(word))
+    let words: Vec<&OsStr> = words.split(' ').map(word).collect();
+    assert!(values.next().is_none(), "more values than {{}} in {words:?}");
+    hums(words)
 }
 
 /// The machine that runs the pipeline.
