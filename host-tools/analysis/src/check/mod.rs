@@ -18,8 +18,6 @@ mod link_loss;
 mod no_times;
 mod overview;
 pub mod past;
-#[cfg(test)]
-mod pauses;
 pub mod problem;
 pub mod radio;
 pub mod text;
@@ -208,3 +206,6 @@ fn checked(place: &LogPlace, read: Read) -> Checked {
     let ending = summary.ending.map(|ending| Ending { name: place.name.clone(), ..ending });
     Checked { name: place.title.clone(), format, judged, ending }
 }
+
+#[cfg(test)]
+mod tests;
