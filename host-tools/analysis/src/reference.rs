@@ -22,7 +22,7 @@ const AGE_MAX: Millis = Millis::from_secs(10);
 pub const MOTORS: usize = 4;
 
 /// One of the reference system's quantities. Motors count from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
     /// Seconds since take-off, kept after landing; 0 before the first.
     FlightTime,

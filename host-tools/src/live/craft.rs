@@ -21,8 +21,8 @@ use hums_link::vocabulary::{Scope, VOCABULARY};
 use hums_link::{Check, Frame, observe};
 
 use super::companion::Companion;
-use super::latest::Latest;
 use crate::mavlink::ids::STATUSTEXT;
+use crate::mavlink::values::Scalar;
 use crate::page::history::History;
 use crate::page::note::Note;
 use crate::part;
@@ -54,7 +54,7 @@ pub struct Craft {
     /// The reference system's view of it.
     pub reference: Reference,
     /// Last values by quantity of the reference system.
-    pub latest: Latest,
+    pub latest: BTreeMap<Quantity, (Instant, Scalar)>,
     /// A HUMS on board.
     pub companion: Companion,
     /// `RPM`, `RAW_RPM`: the first two sensors.
@@ -98,7 +98,7 @@ impl Craft {
         Self {
             monitor: Monitor::new(*params),
             reference: Reference::default(),
-            latest: Latest::default(),
+            latest: BTreeMap::new(),
             companion: Companion::default(),
             speed_sensors: [None; 2],
             worries: BTreeMap::new(),
@@ -218,7 +218,7 @@ impl Craft {
             let of_air = |quantity: &Quantity| matches!(quantity, Quantity::Temperature | Quantity::Pressure);
             for quantity in quantities.into_iter().filter(|quantity| !(other && of_air(quantity))) {
                 if let Some(value) = self.reference.value(at, quantity) {
-                    self.latest.set(at, quantity, value);
+                    self.latest.insert(quantity, (at, value));
                 }
             }
         }

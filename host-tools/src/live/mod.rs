@@ -18,7 +18,6 @@ pub mod guard;
 pub mod http;
 pub mod hub;
 pub mod influx;
-pub mod latest;
 pub mod native;
 pub mod playback;
 pub mod qr;

@@ -6,11 +6,12 @@ use hums_core::clock::Instant;
 use hums_core::component::COMPONENTS_MAX;
 use hums_core::usage::UsageCounter;
 use serde::Serialize;
+use serde_json::Value;
 
 use super::board::{self, HealthBoard};
 use super::companion::CompanionJson;
 use super::craft::Craft;
-use super::values::{Motors, Values};
+use super::values::{self, Values};
 use super::world::World;
 use crate::counters::{about, is_told, tells_flight};
 use crate::names::{autopilot_name, type_name};
@@ -41,26 +42,6 @@ pub struct SourceJson {
     pub speed: f64,
 }
 
-#[derive(Serialize)]
-struct Head<'a> {
-    t: &'static str,
-    source: &'a SourceJson,
-    now_s: f64,
-    /// Milliseconds since 1970, if known.
-    utc_ms: Option<u64>,
-    frames_s: f64,
-    vehicles: Vec<VehicleJson>,
-    influx: Option<&'a super::influx::Figures>,
-}
-
-#[derive(Serialize)]
-struct VehicleJson {
-    system: u8,
-    name: String,
-    overall: &'static str,
-    heard_ms: u64,
-}
-
 /// The head's data, apart from the world.
 #[derive(Clone, Debug)]
 pub struct HeadInputs<'a> {
@@ -78,22 +59,28 @@ pub struct HeadInputs<'a> {
 pub fn all(world: &World, now: Instant, around: &HeadInputs<'_>) -> (String, Vec<(u8, String)>) {
     let boards: Vec<_> = world.crafts.values().map(|craft| HealthBoard::of(craft, now)).collect();
     let crafts = || world.crafts.iter().zip(&boards);
-    let vehicles = crafts().map(|((system, craft), board)| VehicleJson {
-        system: *system,
-        name: name(craft),
-        overall: board.overall,
-        heard_ms: now.since(craft.heard).as_millis(),
+    let vehicles = crafts().map(|((system, craft), board)| {
+        serde_json::json!({
+            "system": system,
+            "name": name(craft),
+            "overall": board.overall,
+            "heard_ms": now.since(craft.heard).as_millis(),
+        })
     });
-    let head = json(&Head {
-        t: "head",
-        source: around.source,
-        now_s: now.as_secs_f64(),
-        utc_ms: around.epoch_us.map(|epoch| epoch.saturating_add(now.as_micros()) / 1000),
-        frames_s: around.frames_s,
-        vehicles: vehicles.collect(),
-        influx: around.influx.as_ref(),
+    let head = serde_json::json!({
+        "t": "head",
+        "source": around.source,
+        "now_s": now.as_secs_f64(),
+        // Milliseconds since 1970, if known.
+        "utc_ms": around.epoch_us.map(|epoch| epoch.saturating_add(now.as_micros()) / 1000),
+        "frames_s": around.frames_s,
+        "vehicles": vehicles.collect::<Vec<_>>(),
+        "influx": around.influx,
     });
-    (head, crafts().map(|((system, craft), board)| (*system, state(*system, craft, board, now))).collect())
+    (
+        json(&head),
+        crafts().map(|((system, craft), board)| (*system, state(*system, craft, board, now))).collect(),
+    )
 }
 
 #[derive(Serialize)]
@@ -115,46 +102,14 @@ struct State<'a> {
     overall_was: Option<&'static str>,
     heard_ms: u64,
     px4: bool,
-    values: Values<'a>,
-    motors: Motors<'a>,
+    values: Values,
+    motors: Vec<Values>,
     cells: Vec<f32>,
     board: &'a [board::SubsystemState],
-    usage: Vec<CounterJson>,
-    components: Vec<ComponentJson>,
-    link: LinkJson,
+    usage: Vec<Value>,
+    components: Vec<Value>,
+    link: Value,
     companion: Option<CompanionJson>,
-}
-
-#[derive(Serialize)]
-struct LinkJson {
-    frames: u64,
-    missing: u64,
-    loss_percent: Option<f32>,
-    reboots: u32,
-}
-
-#[derive(Serialize)]
-struct CounterJson {
-    name: &'static str,
-    title: &'static str,
-    unit: &'static str,
-    decimals: u8,
-    /// `null` if unknown.
-    value: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct ComponentJson {
-    kind: &'static str,
-    number: u8,
-    name: String,
-    status: &'static str,
-    used_percent: Option<f32>,
-    /// Reached first.
-    limit: Option<String>,
-    flight_h: f64,
-    flights: f64,
-    life: bool,
 }
 
 fn state(system: u8, craft: &Craft, board: &HealthBoard, now: Instant) -> String {
@@ -179,8 +134,8 @@ fn state(system: u8, craft: &Craft, board: &HealthBoard, now: Instant) -> String
         overall_was: board.was,
         heard_ms: now.since(craft.heard).as_millis(),
         px4,
-        values: Values::of(craft, now),
-        motors: Motors(Values::of(craft, now)),
+        values: values::of_vehicle(craft, now),
+        motors: values::of_motors(craft, now),
         cells: vehicle.batteries[0]
             .get()
             .map(|battery| battery.cells.iter().flatten().map(|cell| cell.volts().0).collect())
@@ -188,12 +143,12 @@ fn state(system: u8, craft: &Craft, board: &HealthBoard, now: Instant) -> String
         board: &board.parts,
         usage: usage(craft),
         components: components(craft),
-        link: LinkJson {
-            frames: craft.frames,
-            missing: craft.missing,
-            loss_percent: craft.loss.map(|loss| loss * 100.0),
-            reboots: vehicle.reboots,
-        },
+        link: serde_json::json!({
+            "frames": craft.frames,
+            "missing": craft.missing,
+            "loss_percent": craft.loss.map(|loss| loss * 100.0),
+            "reboots": vehicle.reboots,
+        }),
         companion: craft.companion.json(now),
     })
 }
@@ -218,31 +173,33 @@ const SHOWN: [UsageCounter; 12] = [
     UsageCounter::LoadFactorMax,
 ];
 
-fn usage(craft: &Craft) -> Vec<CounterJson> {
+/// A counter's value is `null` if unknown.
+fn usage(craft: &Craft) -> Vec<Value> {
     let (usage, vehicle) = (craft.monitor.usage(), craft.monitor.vehicle());
-    let json = |counter: UsageCounter| {
+    let counter = |counter: UsageCounter| {
         let (title, unit, decimals) = about(counter);
         let value = usage.value(counter).filter(|_| is_told(counter.name(), vehicle));
-        CounterJson { name: counter.name(), title, unit, decimals, value }
+        serde_json::json!({ "name": counter.name(), "title": title, "unit": unit, "decimals": decimals, "value": value })
     };
-    SHOWN.into_iter().map(json).collect()
+    SHOWN.into_iter().map(counter).collect()
 }
 
-fn components(craft: &Craft) -> Vec<ComponentJson> {
-    let json = |place: usize| {
+fn components(craft: &Craft) -> Vec<Value> {
+    let of_place = |place: usize| {
         let component = craft.monitor.components().get(place)?;
         let (figures, status) = craft.monitor.component_figures(place)?;
-        Some(ComponentJson {
-            kind: component.kind.name(),
-            number: component.number,
-            name: component.name.as_str().to_owned(),
-            status: status.name(),
-            used_percent: craft.monitor.component_used_percent(place).filter(|percent| percent.is_finite()),
-            limit: part::of(&craft.monitor, place).and_then(|(_, limit)| limit),
-            flight_h: figures.flight_s / 3_600.0,
-            flights: figures.flights,
-            life: craft.knows_life(place),
-        })
+        Some(serde_json::json!({
+            "kind": component.kind.name(),
+            "number": component.number,
+            "name": component.name.as_str(),
+            "status": status.name(),
+            "used_percent": craft.monitor.component_used_percent(place),
+            // Reached first.
+            "limit": part::of(&craft.monitor, place).and_then(|(_, limit)| limit),
+            "flight_h": figures.flight_s / 3_600.0,
+            "flights": figures.flights,
+            "life": craft.knows_life(place),
+        }))
     };
-    (0..COMPONENTS_MAX).filter_map(json).collect()
+    (0..COMPONENTS_MAX).filter_map(of_place).collect()
 }

@@ -1,46 +1,71 @@
 //! Latest values for the page, with age and staleness.
 
+use std::collections::BTreeMap;
+
 use hums_core::clock::{Instant, Span};
 use hums_core::latest::Latest;
 use hums_core::observation::MOTORS_MAX;
 use hums_core::time;
 use hums_core::vehicle::Vehicle;
-use serde::Serialize;
-use serde::ser::{SerializeMap, SerializeTuple, Serializer};
 
 use super::craft::Craft;
-use super::latest::{ESC, MOTION, QUANTITIES, SLOW};
 use crate::counters::tells_flight;
 use crate::mavlink::values::Scalar;
 use crate::reference::Quantity;
 
+/// Several times a second, over a thin radio once.
+const MOTION: Span = Span::from_millis(2_500);
+/// Other quantities, every two seconds.
+const SLOW: Span = Span::from_millis(6_000);
+
+/// Quantities of a vehicle, with the page's names.
+const QUANTITIES: [(&str, Quantity, Span); 23] = [
+    ("flight_time", Quantity::FlightTime, SLOW),
+    ("battery_percent", Quantity::BatteryPercent, SLOW),
+    ("battery_volts", Quantity::BatteryVolts, SLOW),
+    ("temperature", Quantity::Temperature, SLOW),
+    ("pressure", Quantity::Pressure, SLOW),
+    ("accel_front", Quantity::Acceleration(0), MOTION),
+    ("accel_right", Quantity::Acceleration(1), MOTION),
+    ("accel_down", Quantity::Acceleration(2), MOTION),
+    ("accel_module", Quantity::AccelerationModule, MOTION),
+    ("velocity_north", Quantity::Velocity(0), MOTION),
+    ("velocity_east", Quantity::Velocity(1), MOTION),
+    ("velocity_down", Quantity::Velocity(2), MOTION),
+    ("velocity_module", Quantity::VelocityModule, MOTION),
+    ("gnss_speed", Quantity::GnssSpeed, MOTION),
+    ("altitude", Quantity::Altitude, MOTION),
+    ("latitude", Quantity::Latitude, MOTION),
+    ("longitude", Quantity::Longitude, MOTION),
+    ("airspeed", Quantity::AirSpeed, MOTION),
+    ("groundspeed", Quantity::GroundSpeed, MOTION),
+    ("heading", Quantity::Heading, MOTION),
+    ("throttle", Quantity::Throttle, MOTION),
+    ("hud_altitude", Quantity::HudAltitude, MOTION),
+    ("climb", Quantity::ClimbRate, MOTION),
+];
+
+/// The page's name, and a motor's quantity.
+type MotorValue = (&'static str, fn(usize) -> Quantity);
+
+/// Shown values of an ESC.
+const ESC: [MotorValue; 6] = [
+    ("rpm", Quantity::EscRpm),
+    ("volts", Quantity::EscVoltage),
+    ("amperes", Quantity::EscCurrent),
+    ("failures", Quantity::EscFailures),
+    ("errors", Quantity::EscErrors),
+    ("celsius", Quantity::EscTemperature),
+];
+
 /// Value, milliseconds of age, 1 if stale.
-#[derive(Clone, Copy, Debug)]
-pub struct PageValue {
-    value: Scalar,
-    age_ms: u64,
-    stale: bool,
-}
+type Aged = (Scalar, u64, u8);
+/// Values by name.
+pub type Values = BTreeMap<&'static str, Aged>;
 
-impl PageValue {
-    fn new(now: Instant, at: Instant, value: Scalar, limit: Span) -> Self {
-        let age = now.since(at);
-        Self { value, age_ms: age.as_millis(), stale: age > limit }
-    }
-}
-
-impl Serialize for PageValue {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut tuple = serializer.serialize_tuple(3)?;
-        match self.value {
-            // 15.3, not 15.300000190734863. Infinite values and `NaN` become null.
-            Scalar::Single(value) => tuple.serialize_element(&value)?,
-            other => tuple.serialize_element(&other.as_f64())?,
-        }
-        tuple.serialize_element(&self.age_ms)?;
-        tuple.serialize_element(&u8::from(self.stale))?;
-        tuple.end()
-    }
+fn aged(now: Instant, at: Instant, value: Scalar, limit: Span) -> Aged {
+    let age = now.since(at);
+    (value, age.as_millis(), u8::from(age > limit))
 }
 
 type Told = (Option<time::BootMs>, Option<f32>);
@@ -107,86 +132,42 @@ fn amperes(vehicle: &Vehicle) -> Told {
     if of_battery.1.is_some() { of_battery } else { of_system() }
 }
 
-/// Known values by name.
-#[derive(Debug)]
-pub struct Values<'a> {
-    craft: &'a Craft,
-    now: Instant,
-}
-
-impl<'a> Values<'a> {
-    /// The values of a vehicle.
-    pub fn of(craft: &'a Craft, now: Instant) -> Self {
-        Self { craft, now }
-    }
-
-    fn each(&self, mut each: impl FnMut(&'static str, PageValue)) {
-        let (craft, now) = (self.craft, self.now);
-        let vehicle = craft.monitor.vehicle();
-        for (name, quantity, limit) in &QUANTITIES {
-            let is_known = *quantity != Quantity::FlightTime || tells_flight(vehicle);
-            if let Some((at, value)) = craft.latest.get(*quantity).filter(|_| is_known) {
-                let is_flown = *quantity == Quantity::FlightTime;
-                let value = if is_flown { Scalar::Double(craft.flown_s()) } else { value };
-                each(name, PageValue::new(now, at, value, *limit));
-            }
-        }
-        for (name, limit, value) in OF_VEHICLE {
-            if let (Some(at), Some(value)) = value(vehicle) {
-                each(name, PageValue::new(now, Instant::of(at, now), Scalar::Single(value), *limit));
-            }
-        }
-        for (sensor, name) in craft.speed_sensors.iter().zip(["speed_sensor_0", "speed_sensor_1"]) {
-            if let Some((at, rpm)) = sensor {
-                each(name, PageValue::new(now, *at, Scalar::Single(*rpm), SLOW));
-            }
+/// The known values of a vehicle.
+pub fn of_vehicle(craft: &Craft, now: Instant) -> Values {
+    let vehicle = craft.monitor.vehicle();
+    let mut values = Values::new();
+    for (name, quantity, limit) in QUANTITIES {
+        let is_flown = quantity == Quantity::FlightTime;
+        let known = craft.latest.get(&quantity).filter(|_| !is_flown || tells_flight(vehicle));
+        if let Some((at, value)) = known {
+            let value = if is_flown { Scalar::Double(craft.flown_s()) } else { *value };
+            values.insert(name, aged(now, *at, value, limit));
         }
     }
-}
-
-impl Serialize for Values<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        let mut result = Ok(());
-        self.each(|name, shown| {
-            if result.is_ok() {
-                result = map.serialize_entry(name, &shown);
-            }
-        });
-        result?;
-        map.end()
-    }
-}
-
-/// Motors by number; a missing one is an empty object.
-#[derive(Debug)]
-pub struct Motors<'a>(pub Values<'a>);
-
-impl Serialize for Motors<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Values { craft, now } = self.0;
-        let heard = |motor: usize| ESC.iter().any(|(_, of)| craft.latest.get(of(motor)).is_some());
-        let count = (0..MOTORS_MAX).rev().find(|motor| heard(*motor)).map_or(0, |last| last + 1);
-        serializer.collect_seq((0..count).map(|number| Motor { craft, now, number }))
-    }
-}
-
-struct Motor<'a> {
-    craft: &'a Craft,
-    now: Instant,
-    number: usize,
-}
-
-impl Serialize for Motor<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        for (name, of) in ESC {
-            if let Some((at, value)) = self.craft.latest.get(of(self.number)) {
-                map.serialize_entry(name, &PageValue::new(self.now, at, value, SLOW))?;
-            }
+    for (name, limit, value) in OF_VEHICLE {
+        if let (Some(at), Some(value)) = value(vehicle) {
+            values.insert(name, aged(now, Instant::of(at, now), Scalar::Single(value), *limit));
         }
-        map.end()
     }
+    for (sensor, name) in craft.speed_sensors.iter().zip(["speed_sensor_0", "speed_sensor_1"]) {
+        if let Some((at, rpm)) = sensor {
+            values.insert(name, aged(now, *at, Scalar::Single(*rpm), SLOW));
+        }
+    }
+    values
+}
+
+/// The motors by number; a missing one has no values.
+pub fn of_motors(craft: &Craft, now: Instant) -> Vec<Values> {
+    let known = |motor, of: fn(usize) -> Quantity| craft.latest.get(&of(motor));
+    let values = |motor| {
+        let values = ESC.into_iter().filter_map(|(name, of)| Some((name, known(motor, of)?)));
+        values.map(|(name, (at, value))| (name, aged(now, *at, *value, SLOW))).collect()
+    };
+    let mut motors: Vec<Values> = (0..MOTORS_MAX).map(values).collect();
+    let count = motors.iter().rposition(|values| !values.is_empty()).map_or(0, |last| last + 1);
+    motors.truncate(count);
+    motors
 }
 
 #[cfg(test)]
@@ -196,8 +177,8 @@ mod tests {
     #[test]
     fn a_value_is_as_short_as_it_was_sent_and_says_its_age() {
         let at = Instant::from_millis(1_000);
-        let shown = |now_ms, value| PageValue::new(Instant::from_millis(now_ms), at, value, SLOW);
-        let json = |shown: PageValue| serde_json::to_string(&shown).expect("JSON");
+        let shown = |now_ms, value| aged(Instant::from_millis(now_ms), at, value, SLOW);
+        let json = |shown: Aged| serde_json::to_string(&shown).expect("JSON");
         assert_eq!(json(shown(1_200, Scalar::Single(15.3))), "[15.3,200,0]");
         assert_eq!(json(shown(7_001, Scalar::Single(f32::NAN))), "[null,6001,1]");
         assert_eq!(json(shown(1_000, Scalar::Double(47.397_922_9))), "[47.3979229,0,0]");

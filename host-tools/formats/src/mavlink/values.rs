@@ -4,6 +4,7 @@
 //! zero. Of a longer, newer payload the known fields are kept.
 
 use hums_dialect::{Field, Kind, Message};
+use serde::Serialize;
 
 /// One field's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,8 +17,9 @@ pub enum FieldValue<'a> {
     Text(&'a [u8]),
 }
 
-/// One number, in the type it was sent in.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// One number, in the type it was sent in. As JSON it is 15.3, not 15.300000190734863.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Scalar {
     /// An unsigned integer of any width.
     Unsigned(u64),
