@@ -24,6 +24,7 @@
 pub mod blocks;
 mod boot;
 pub mod booted;
+mod buffer;
 pub mod checksums;
 pub mod clock;
 mod compressed;

@@ -10,8 +10,8 @@
 use std::io::{self, Read};
 
 use super::ahead::{AHEAD_BYTES, Ahead};
-use super::buffer::Buffer;
 use super::format::{HEADER_BYTES, Lengths};
+use crate::source::buffer::Buffer;
 
 const HEAD: [u8; 2] = [0xA3, 0x95];
 const MESSAGE_BYTES_MAX: u64 = 256;
@@ -70,7 +70,8 @@ impl<R: Read> Binary<R> {
     }
 
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
-        self.buffer.window(bytes)
+        self.buffer.try_fill(bytes)?;
+        Ok(self.buffer.rest())
     }
 
     pub(super) fn place(&self) -> u64 {
@@ -81,19 +82,18 @@ impl<R: Read> Binary<R> {
     /// type's two lengths.
     pub(super) fn next(&mut self, lengths: &mut Lengths) -> io::Result<Option<Piece<'_>>> {
         loop {
-            self.buffer.fill(LOOKAHEAD_BYTES.max(AHEAD_BYTES))?;
-            let rest = self.buffer.rest();
+            self.buffer.try_fill(LOOKAHEAD_BYTES.max(AHEAD_BYTES))?;
+            let (rest, is_end) = (self.buffer.rest(), self.buffer.ended());
             if rest.is_empty() {
                 let end = self.skipped.take().map(|skipped| Piece::Damage(skipped.told(true)));
                 return Ok(end);
             }
-            match look(rest, self.buffer.ended(), lengths) {
+            match look(rest, is_end, lengths) {
                 Look::Message(length) => {
                     if let Some(skipped) = self.skipped.take() {
                         return Ok(Some(Piece::Damage(skipped.told(false))));
                     }
                     let place = self.place();
-                    let is_end = self.buffer.ended();
                     let (bytes, after) = self.buffer.take_before(length);
                     let after = Ahead { bytes: after, is_text: false, is_end };
                     let kind = bytes.get(2).copied().unwrap_or_default();

@@ -8,7 +8,6 @@
 
 mod ahead;
 mod binary;
-mod buffer;
 mod clock;
 mod definition;
 mod epoch;

@@ -5,7 +5,8 @@
 use std::borrow::Cow;
 use std::io::{self, Read};
 
-use super::buffer::Buffer;
+use super::ahead::AHEAD_BYTES;
+use crate::source::buffer::Buffer;
 
 const LINE_BYTES_MAX: usize = 64 * 1024;
 
@@ -40,12 +41,13 @@ impl<R: Read> Lines<R> {
     }
 
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
-        self.0.window(bytes)
+        self.0.try_fill(bytes)?;
+        Ok(self.0.rest())
     }
 
     /// `None` at the end.
     pub(super) fn next(&mut self) -> io::Result<Option<Line<'_>>> {
-        self.0.fill(LINE_BYTES_MAX)?;
+        self.0.try_fill(LINE_BYTES_MAX.max(AHEAD_BYTES))?;
         let rest = self.0.rest();
         if rest.is_empty() {
             return Ok(None);
@@ -119,6 +121,6 @@ mod tests {
             assert!(line.words.len() <= LINE_BYTES_MAX);
             count += 1;
         }
-        assert_eq!((count, lines.0.capacity() < 1 << 20), (64, true));
+        assert_eq!((count, lines.0.capacity() <= 1 << 20), (64, true));
     }
 }

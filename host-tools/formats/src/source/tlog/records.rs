@@ -5,11 +5,11 @@
 use std::io::{self, Read};
 
 use crate::mavlink::frame::{Check, FRAME_BYTES_MAX, Peek, peek};
+use crate::source::buffer::Buffer;
 use crate::source::doubt::ASKED;
-use crate::source::stream::read_some;
 
 pub(in crate::source) const TIME_BYTES: usize = 8;
-const BUFFER_BYTES: usize = 64 * 1024;
+const NOISE_BYTES: usize = 64 * 1024;
 const RECORD_BYTES: usize = 2 * (TIME_BYTES + FRAME_BYTES_MAX);
 /// Records that confirm a time, behind damage as well.
 const AHEAD_BYTES: usize = 256 * 1024;
@@ -37,10 +37,7 @@ pub enum Record {
 
 /// The records of a tlog, in order.
 pub struct Records<R> {
-    input: R,
-    buffer: Vec<u8>,
-    at: usize,
-    ended: bool,
+    buffer: Buffer<R>,
     /// Following bytes to keep.
     ahead_bytes: usize,
 }
@@ -48,15 +45,11 @@ pub struct Records<R> {
 impl<R: Read> Records<R> {
     /// No further than necessary: another program may be writing it.
     pub fn new(input: R) -> Self {
-        Self { input, buffer: Vec::new(), at: 0, ended: false, ahead_bytes: RECORD_BYTES }
+        Self { buffer: Buffer::new(input), ahead_bytes: RECORD_BYTES }
     }
 
     pub(in crate::source) fn ahead(input: R) -> Self {
         Self { ahead_bytes: AHEAD_BYTES, ..Self::new(input) }
-    }
-
-    fn rest(&self) -> &[u8] {
-        self.buffer.get(self.at..).unwrap_or_default()
     }
 
     pub(in crate::source) fn times_after(&self) -> (Vec<u64>, bool) {
@@ -82,9 +75,9 @@ impl<R: Read> Records<R> {
 
     /// Until `each` returns `false`. Returns whether the recording ends there.
     pub(in crate::source) fn each_after(&self, each: &mut dyn FnMut(u64, &[u8]) -> bool) -> bool {
-        let (mut rest, mut nothing) = (self.rest(), 0);
+        let (mut rest, mut nothing) = (self.buffer.rest(), 0);
         while !rest.is_empty() {
-            let Some((time_us, length)) = record_at(rest, self.ended) else {
+            let Some((time_us, length)) = record_at(rest, self.buffer.ended()) else {
                 rest = rest.get(1..).unwrap_or_default();
                 nothing += 1;
                 continue;
@@ -95,54 +88,38 @@ impl<R: Read> Records<R> {
             rest = rest.get(TIME_BYTES + length..).unwrap_or_default();
             nothing = 0;
         }
-        self.ended || nothing >= NOTHING_BYTES
+        self.buffer.ended() || nothing >= NOTHING_BYTES
     }
 
     /// The input ended with these last bytes, in a record.
     pub(in crate::source) fn is_cut(&self, noise: &[u8]) -> bool {
         let frame = noise.get(TIME_BYTES..).filter(|frame| !frame.is_empty());
-        self.ended
-            && self.rest().is_empty()
+        self.buffer.ended()
+            && self.buffer.rest().is_empty()
             && noise.first() == Some(&0)
             && frame.is_none_or(|frame| matches!(peek(frame), Peek::Short))
-    }
-
-    fn fill(&mut self) -> io::Result<()> {
-        if self.ended || self.rest().len() >= self.ahead_bytes {
-            return Ok(());
-        }
-        self.buffer.drain(..self.at);
-        self.at = 0;
-        // The rest is not moved for each chunk.
-        while self.buffer.len() < 2 * self.ahead_bytes && !self.ended {
-            let old = self.buffer.len();
-            self.buffer.resize(old + BUFFER_BYTES, 0);
-            let got = read_some(&mut self.input, self.buffer.get_mut(old..).unwrap_or_default())?;
-            self.buffer.truncate(old + got);
-            self.ended = got == 0;
-        }
-        Ok(())
     }
 
     /// `None` at the end.
     pub fn next_record(&mut self) -> io::Result<Option<Record>> {
         let mut noise = Vec::new();
         loop {
-            self.fill()?;
-            if self.rest().is_empty() {
+            self.buffer.try_fill(self.ahead_bytes)?;
+            let rest = self.buffer.rest();
+            let Some(first) = rest.first() else {
                 return Ok((!noise.is_empty()).then_some(Record::Noise(noise)));
-            }
-            if let Some((time_us, length)) = record_at(self.rest(), self.ended) {
+            };
+            if let Some((time_us, length)) = record_at(rest, self.buffer.ended()) {
                 if !noise.is_empty() {
                     return Ok(Some(Record::Noise(noise)));
                 }
-                let bytes = self.rest().get(TIME_BYTES..TIME_BYTES + length).unwrap_or_default().to_vec();
-                self.at += TIME_BYTES + length;
+                let record = self.buffer.take(TIME_BYTES + length);
+                let bytes = record.get(TIME_BYTES..).unwrap_or_default().to_vec();
                 return Ok(Some(Record::Frame { time_us, bytes }));
             }
-            noise.push(self.rest().first().copied().unwrap_or_default());
-            self.at += 1;
-            if noise.len() >= BUFFER_BYTES {
+            noise.push(*first);
+            self.buffer.take(1);
+            if noise.len() >= NOISE_BYTES {
                 return Ok(Some(Record::Noise(noise)));
             }
         }

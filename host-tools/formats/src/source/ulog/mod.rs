@@ -4,7 +4,6 @@
 //!
 //! | file | does |
 //! |---|---|
-//! | `window` | a contiguous part of the input |
 //! | `message` | tells messages from damage, and finds the next one |
 //! | `format` | definitions, and the places of fields that follow from them |
 //! | `topics` | the topic of each number |
@@ -14,7 +13,7 @@
 //! | `px4` | observations from PX4's topics, the same as from PX4's MAVLink messages |
 //! | `session` | one pass over all of it |
 //!
-//! Memory: a window of 1 MiB, 1,024 definitions with 32,768 fields, 4,096 subscriptions. Appended data (a
+//! Memory: a buffer of 1 MiB, 1,024 definitions with 32,768 fields, 4,096 subscriptions. Appended data (a
 //! crash dump) come last.
 
 mod fields;
@@ -27,16 +26,15 @@ mod session;
 mod tests;
 mod times;
 mod topics;
-mod window;
 
 use std::io::Read;
 
 use anyhow::Result;
 
 pub use self::px4::{mode_name, nav_state};
+use super::buffer::Buffer;
 use super::input::Input;
 use super::item::{ItemSink, Needs, Reader, RecordingSummary};
-use window::Window;
 
 /// Whether these first bytes are of a ULog.
 pub fn detect(start: &[u8]) -> bool {
@@ -50,18 +48,18 @@ pub fn open(input: Input) -> Result<Box<dyn Reader>> {
 
 /// A log's reader.
 pub struct Ulog<R> {
-    window: Window<R>,
+    buffer: Buffer<R>,
 }
 
 impl<R: Read> Ulog<R> {
     /// Reads from `input`.
     pub fn new(input: R) -> Self {
-        Self { window: Window::new(input) }
+        Self { buffer: Buffer::new(input) }
     }
 }
 
 impl<R: Read + Send> Reader for Ulog<R> {
     fn read(&mut self, want: Needs<'_>, take: &mut ItemSink<'_>) -> Result<RecordingSummary> {
-        session::read(&mut self.window, want, take)
+        session::read(&mut self.buffer, want, take)
     }
 }

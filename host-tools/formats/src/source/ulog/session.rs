@@ -18,7 +18,7 @@ use super::px4::{Px4, Report, Sample};
 use super::rows;
 use super::times;
 use super::topics::Subscriptions;
-use super::window::Window;
+use crate::source::buffer::Buffer;
 use crate::source::clock::{self, Clock, Reading, Stamp, WrongTimes};
 use crate::source::item::{
     Cause, CellValue, Column, ColumnType, Event, Fact, FactKind, Gap, Item, ItemSink, Mode, Needs, Parameter,
@@ -43,25 +43,25 @@ const HARD_FAULT: &str = "hardfault_plain";
 const WORDS_BYTES_MAX: usize = 256;
 
 pub(super) fn read<R: Read>(
-    window: &mut Window<R>,
+    buffer: &mut Buffer<R>,
     want: Needs<'_>,
     take: &mut ItemSink<'_>,
 ) -> Result<RecordingSummary> {
-    window.fill(FILE_HEADER_BYTES);
-    let Some((version, time_us)) = beginning(window.rest()) else {
+    buffer.fill(FILE_HEADER_BYTES);
+    let Some((version, time_us)) = beginning(buffer.rest()) else {
         bail!("is no PX4 log: a ULog begins with 16 bytes of header, and this does not");
     };
-    window.consume(FILE_HEADER_BYTES);
+    buffer.take(FILE_HEADER_BYTES);
     let mut session = Session::new(want, take);
-    let first = times::first_in(window);
-    session.begin(0, time_us, &first, window.ended());
+    let first = times::first_in(buffer);
+    session.begin(0, time_us, &first, buffer.ended());
     session.version(0, version)?;
     loop {
-        window.fill(LOOK_BYTES);
-        let place = window.place();
-        let rest = session.part(window.rest(), place);
+        buffer.fill(LOOK_BYTES);
+        let place = buffer.place();
+        let rest = session.part(buffer.rest(), place);
         if rest.is_empty() {
-            if !session.next_part(window.rest().is_empty()) {
+            if !session.next_part(buffer.rest().is_empty()) {
                 break;
             }
             continue;
@@ -70,31 +70,31 @@ pub(super) fn read<R: Read>(
             Found::Message(message, bytes) => {
                 let after = rest.get(bytes..).unwrap_or_default();
                 session.message(place, &message, bytes, after)?;
-                window.consume(bytes);
+                buffer.take(bytes);
             }
-            found => damage(window, &mut session, found == Found::Cut)?,
+            found => damage(buffer, &mut session, found == Found::Cut)?,
         }
     }
-    if let Some(error) = window.take_trouble() {
+    if let Some(error) = buffer.take_trouble() {
         let words = format!("an input that cannot be read further: {error}");
-        session.gap(Cause::Damaged, Some(window.place()), 0, words)?;
+        session.gap(Cause::Damaged, Some(buffer.place()), 0, words)?;
     }
     session.end()
 }
 
-fn damage<R: Read>(window: &mut Window<R>, session: &mut Session<'_, '_>, cut: bool) -> Result<()> {
-    let place = window.place();
+fn damage<R: Read>(buffer: &mut Buffer<R>, session: &mut Session<'_, '_>, cut: bool) -> Result<()> {
+    let place = buffer.place();
     let (mut from, mut bytes, mut zeros, mut found) = (1, 0, true, false);
     while !found {
-        window.fill(FIND_BYTES);
-        let rest = session.part(window.rest(), window.place());
-        let last = window.ended() || rest.len() < window.rest().len();
+        buffer.fill(FIND_BYTES);
+        let rest = session.part(buffer.rest(), buffer.place());
+        let last = buffer.ended() || rest.len() < buffer.rest().len();
         let next = session.find(rest, from, last);
         found = next.is_ok();
         let skipped = next.unwrap_or_else(|none| none);
         zeros &= rest.get(..skipped).unwrap_or_default().iter().all(|&byte| byte == 0);
         bytes += skipped as u64;
-        window.consume(skipped);
+        buffer.take(skipped);
         if last {
             break;
         }

@@ -4,7 +4,7 @@ use std::io::Read;
 
 use super::message::{DataAfter, Found, MESSAGE_BYTES_MAX, Message, Parser, data_after};
 use super::topics::Subscriptions;
-use super::window::Window;
+use crate::source::buffer::Buffer;
 use crate::source::clock::{BEGINNING_ASKED, LaterTimes, Rules, Stamp};
 use crate::source::doubt::{ASKED, Ends};
 
@@ -81,11 +81,11 @@ pub(super) fn first(bytes: &[u8]) -> Vec<u64> {
     messages.filter_map(time).take(4 * BEGINNING_ASKED).collect()
 }
 
-pub(super) fn first_in<R: Read>(window: &mut Window<R>) -> Vec<u64> {
-    let times = first(window.rest());
-    if times.len() >= BEGINNING_ASKED || window.ended() {
+pub(super) fn first_in<R: Read>(buffer: &mut Buffer<R>) -> Vec<u64> {
+    let times = first(buffer.rest());
+    if times.len() >= BEGINNING_ASKED || buffer.ended() {
         return times;
     }
-    window.fill(FIRST_BYTES);
-    first(window.rest())
+    buffer.fill(FIRST_BYTES);
+    first(buffer.rest())
 }
