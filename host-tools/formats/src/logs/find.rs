@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 
 use super::card::{image, whole_file};
-use super::folder::directory;
+use super::folder::{Segments, directory, sessions};
 pub use super::found::{FoundLogs, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
-use super::naming::{SegmentName, is_part, make_unique, name_after, segment_or_part};
+use super::naming::{is_part, make_unique, name_after, segment_or_part};
 use super::places::Log;
 use crate::files::{is_seekable, why_unread};
 
@@ -29,7 +29,8 @@ pub fn find_in(folder: &Path, salvage: bool) -> Result<FoundLogs> {
 
 fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>) -> Result<FoundLogs> {
     let mut found = FoundLogs::default();
-    let mut segments = Segments::new();
+    // By folder.
+    let mut segments = BTreeMap::<PathBuf, Segments>::new();
     for input in inputs {
         let before = found.logs.len();
         let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
@@ -97,9 +98,6 @@ fn named_file(path: &Path, salvage: bool, found: &mut FoundLogs) -> Result<()> {
     Ok(())
 }
 
-/// Segments by folder; whether each is whole or a part.
-type Segments = BTreeMap<PathBuf, Vec<(bool, SegmentName, Log)>>;
-
 /// The folder of a file, in one spelling.
 fn folder_of(path: &Path) -> PathBuf {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -107,7 +105,7 @@ fn folder_of(path: &Path) -> PathBuf {
 }
 
 /// As a folder with just these segments. Those of one folder are of one card.
-fn as_in_folders(segments: Segments) -> Vec<Log> {
+fn as_in_folders(segments: BTreeMap<PathBuf, Segments>) -> Vec<Log> {
     let (mut logs, mut prefixes) = (Vec::<Log>::new(), BTreeMap::<String, u32>::new());
     let is_one = segments.len() == 1;
     for (folder, mut segments) in segments {
@@ -120,22 +118,7 @@ fn as_in_folders(segments: Segments) -> Vec<Log> {
             count => format!("{name}-{count}/"),
         };
         segments.sort_by(|(is_whole, one, _), (other_is, other, _)| (is_whole, one).cmp(&(other_is, other)));
-        let mut before = None;
-        for (is_whole, segment, mut log) in segments {
-            if is_whole {
-                log.name = format!("{prefix}{}", segment.log());
-            }
-            let session = Some((is_whole, segment.of, segment.session));
-            let is_same = before == session;
-            before = session;
-            match logs.last_mut().filter(|_| is_same) {
-                Some(last) => {
-                    last.files.append(&mut log.files);
-                    last.pieces.append(&mut log.pieces);
-                }
-                None => logs.push(log),
-            }
-        }
+        logs.extend(sessions(segments, &prefix));
     }
     logs
 }

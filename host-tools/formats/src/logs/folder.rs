@@ -1,7 +1,7 @@
 //! Walks a folder for logs and images of cards. Links are followed, but each file and folder is read once. Pipes, sockets,
 //! devices and dead links are passed over with a remark: opening a pipe may block.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs::{self, DirEntry, FileType};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -26,9 +26,8 @@ const PACKED: [&str; 5] = [".gz", ".xz", ".zst", ".bz2", ".zip"];
 
 #[derive(Default)]
 struct Entries {
-    /// By session, under its first one's name; parts are by themselves.
-    sessions: BTreeMap<(bool, SegmentName), Vec<(SegmentName, PathBuf)>>,
-    segments: usize,
+    /// Whether each is whole or a part.
+    segments: Vec<(bool, SegmentName, PathBuf)>,
     /// Logs and images.
     files: Vec<PathBuf>,
     folders: Vec<PathBuf>,
@@ -41,7 +40,7 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut FoundLogs) -> Re
         if !walked.is_new(&dir) {
             continue;
         }
-        let Entries { sessions, mut files, mut folders, .. } = match entries(&dir, found) {
+        let Entries { mut segments, mut files, mut folders } = match entries(&dir, found) {
             Err(error) if depth > 0 => {
                 found.leave_out(format!("{error:#}"));
                 continue;
@@ -51,9 +50,9 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut FoundLogs) -> Re
         files.sort();
         folders.sort();
         for path in files {
-            if found.is_known(&path) {
-                found.remark(format!("{}: is the same file as another one; it is read once", path.display()));
-            } else if let Err(error) = file(&path, salvage, found) {
+            if is_new(&path, found)
+                && let Err(error) = file(&path, salvage, found)
+            {
                 found.leave_out(format!("{error:#}"));
             }
         }
@@ -67,39 +66,52 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut FoundLogs) -> Re
                 ));
             }
         }
-        let prefix = dir.strip_prefix(root).unwrap_or(Path::new("")).to_string_lossy().into_owned();
-        for ((is_whole, name), mut segments) in sessions {
-            segments.sort();
-            let part = segments.first().filter(|_| !is_whole).and_then(|(_, path)| path.file_stem());
-            let name = match part {
-                Some(part) => part.to_string_lossy().into_owned(),
-                None if prefix.is_empty() => name.log(),
-                None => format!("{prefix}/{}", name.log()),
-            };
-            let mut log =
-                Log { name, files: Vec::new(), pieces: Vec::new(), session: None, left_over: false };
-            for (_, path) in segments {
-                if found.is_known(&path) {
-                    found.remark(format!(
-                        "{}: is the same file as another one; it is read once",
-                        path.display()
-                    ));
-                    continue;
-                }
+        segments.sort();
+        let mut read = Vec::new();
+        for (is_whole, name, path) in segments {
+            if is_new(&path, found) {
                 match whole_file(&path) {
-                    Ok(segment) => {
-                        log.files.extend(segment.files);
-                        log.pieces.extend(segment.pieces);
-                    }
+                    Ok(log) => read.push((is_whole, name, log)),
                     Err(error) => found.leave_out(format!("{error:#}")),
                 }
             }
-            if !log.pieces.is_empty() {
-                found.log(log);
-            }
         }
+        let prefix = dir.strip_prefix(root).unwrap_or(Path::new("")).to_string_lossy();
+        found.add(sessions(read, &if prefix.is_empty() { String::new() } else { format!("{prefix}/") }));
     }
     Ok(())
+}
+
+fn is_new(path: &Path, found: &mut FoundLogs) -> bool {
+    let is_known = found.is_known(path);
+    if is_known {
+        found.remark(format!("{}: is the same file as another one; it is read once", path.display()));
+    }
+    !is_known
+}
+
+/// The segments of a folder, in order; whether each is whole or a part.
+pub(super) type Segments = Vec<(bool, SegmentName, Log)>;
+
+/// The log of each session, whose segments are together. Parts are a log by themselves, named after the first.
+pub(super) fn sessions(segments: Segments, prefix: &str) -> Vec<Log> {
+    let (mut logs, mut before) = (Vec::<Log>::new(), None);
+    for (is_whole, segment, mut log) in segments {
+        if is_whole {
+            log.name = format!("{prefix}{}", segment.log());
+        }
+        let session = Some((is_whole, segment.first()));
+        let is_same = before == session;
+        before = session;
+        match logs.last_mut().filter(|_| is_same) {
+            Some(last) => {
+                last.files.append(&mut log.files);
+                last.pieces.append(&mut log.pieces);
+            }
+            None => logs.push(log),
+        }
+    }
+    logs
 }
 
 /// Folders that were walked, by their identity: links may lead to one twice.
@@ -149,10 +161,8 @@ impl Entries {
             (Ok(Content::Unread(unread)), _) => found.leave_out(format!("{shown}: {unread}")),
             // The report on a log says if the file holds none.
             (Ok(content), Some(_)) if content != Content::Log && path.extension().is_none() => {}
-            (Ok(_), Some(name)) if self.segments < SEGMENTS_MAX => {
-                self.segments += 1;
-                let session = (!is_part(&path), name.first());
-                self.sessions.entry(session).or_default().push((name, path));
+            (Ok(_), Some(name)) if self.segments.len() < SEGMENTS_MAX => {
+                self.segments.push((!is_part(&path), name, path));
             }
             (Ok(_), Some(_)) => {
                 found.leave_out(format!("{shown}: is left out: there are too many segments"));
