@@ -32,6 +32,11 @@ pub enum Scalar {
 }
 
 impl Scalar {
+    /// The number at the beginning of some bytes.
+    pub fn read(kind: Kind, bytes: &[u8]) -> Option<Self> {
+        bytes.get(..kind.size()).map(|bytes| scalar(kind, bytes))
+    }
+
     /// Exact but for integers beyond 2^53.
     pub fn as_f64(self) -> f64 {
         match self {

@@ -15,9 +15,11 @@ use hums_blackbox::Record;
 use hums_core::cause::Alert;
 use hums_core::clock::Instant;
 use hums_core::observation::{Observation, Source};
+use hums_dialect::Kind;
 use hums_link::Frame;
 
 use crate::ending::Ending;
+use crate::mavlink::values::Scalar;
 
 /// The component that an autopilot is: `MAV_COMP_ID_AUTOPILOT1`.
 pub const AUTOPILOT: u8 = 1;
@@ -205,6 +207,18 @@ pub enum ColumnType {
     Bytes,
 }
 
+impl ColumnType {
+    /// Of numbers.
+    pub const fn of(kind: Kind) -> Self {
+        match kind {
+            Kind::U8 | Kind::U16 | Kind::U32 | Kind::U64 | Kind::Char => Self::Unsigned,
+            Kind::I8 | Kind::I16 | Kind::I32 | Kind::I64 => Self::Signed,
+            Kind::F32 => Self::Single,
+            Kind::F64 => Self::Double,
+        }
+    }
+}
+
 /// A value for each column, of its kind or [`CellValue::Unknown`]; a text log may have [`CellValue::Text`] instead.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
@@ -233,6 +247,17 @@ pub enum CellValue<'a> {
     Text(&'a str),
     /// A file's content ([`ColumnType::Bytes`]).
     Bytes(&'a [u8]),
+}
+
+impl From<Scalar> for CellValue<'_> {
+    fn from(number: Scalar) -> Self {
+        match number {
+            Scalar::Unsigned(value) => Self::Unsigned(value),
+            Scalar::Signed(value) => Self::Signed(value),
+            Scalar::Single(value) => Self::Single(value),
+            Scalar::Double(value) => Self::Double(value),
+        }
+    }
 }
 
 impl CellValue<'_> {

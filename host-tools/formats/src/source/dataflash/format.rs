@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use hums_dialect::Kind;
+
 use crate::source::item::Table;
 
 /// Two of head, one of type.
@@ -16,38 +18,13 @@ const FIELDS_MAX: usize = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FieldKind {
-    /// `b`
-    I8,
-    /// `B`
-    U8,
+    Number(Kind),
     /// `M`: a flight mode, a number in a binary log and a name in a text log
     Mode,
-    /// `h`
-    I16,
-    /// `H`
-    U16,
-    /// `i`
-    I32,
-    /// `I`
-    U32,
-    /// `q`
-    I64,
-    /// `Q`
-    U64,
     /// `g`
     Half,
-    /// `f`
-    Single,
-    /// `d`
-    Double,
-    /// `c`: hundredths
-    CentiI16,
-    /// `C`: hundredths
-    CentiU16,
-    /// `e`: hundredths
-    CentiI32,
-    /// `E`: hundredths
-    CentiU32,
+    /// `c`, `C`, `e`, `E`
+    Hundredths(Kind),
     /// `L`: 1e-7 degrees
     Degrees,
     /// `n`, `N`, `Z`: text, ended by a NUL if shorter
@@ -64,22 +41,22 @@ pub(super) const ARRAY_LENGTH: usize = 32;
 impl FieldKind {
     fn of(character: u8) -> Option<Self> {
         Some(match character {
-            b'b' => Self::I8,
-            b'B' => Self::U8,
+            b'b' => Self::Number(Kind::I8),
+            b'B' => Self::Number(Kind::U8),
             b'M' => Self::Mode,
-            b'h' => Self::I16,
-            b'H' => Self::U16,
-            b'i' => Self::I32,
-            b'I' => Self::U32,
-            b'q' => Self::I64,
-            b'Q' => Self::U64,
+            b'h' => Self::Number(Kind::I16),
+            b'H' => Self::Number(Kind::U16),
+            b'i' => Self::Number(Kind::I32),
+            b'I' => Self::Number(Kind::U32),
+            b'q' => Self::Number(Kind::I64),
+            b'Q' => Self::Number(Kind::U64),
             b'g' => Self::Half,
-            b'f' => Self::Single,
-            b'd' => Self::Double,
-            b'c' => Self::CentiI16,
-            b'C' => Self::CentiU16,
-            b'e' => Self::CentiI32,
-            b'E' => Self::CentiU32,
+            b'f' => Self::Number(Kind::F32),
+            b'd' => Self::Number(Kind::F64),
+            b'c' => Self::Hundredths(Kind::I16),
+            b'C' => Self::Hundredths(Kind::U16),
+            b'e' => Self::Hundredths(Kind::I32),
+            b'E' => Self::Hundredths(Kind::U32),
             b'L' => Self::Degrees,
             b'n' => Self::Text(4),
             b'N' => Self::Text(16),
@@ -91,10 +68,10 @@ impl FieldKind {
 
     pub(super) const fn size(self) -> usize {
         match self {
-            Self::I8 | Self::U8 | Self::Mode => 1,
-            Self::I16 | Self::U16 | Self::CentiI16 | Self::CentiU16 | Self::Half => 2,
-            Self::I32 | Self::U32 | Self::CentiI32 | Self::CentiU32 | Self::Degrees | Self::Single => 4,
-            Self::I64 | Self::U64 | Self::Double => 8,
+            Self::Number(kind) | Self::Hundredths(kind) => kind.size(),
+            Self::Mode => 1,
+            Self::Half => 2,
+            Self::Degrees => 4,
             Self::Text(bytes) => bytes as usize,
             Self::Array => 2 * ARRAY_LENGTH,
         }
@@ -102,23 +79,15 @@ impl FieldKind {
 
     /// FMTU's multiplier is then already in it.
     const fn scales(self) -> bool {
-        matches!(self, Self::CentiI16 | Self::CentiU16 | Self::CentiI32 | Self::CentiU32 | Self::Degrees)
+        matches!(self, Self::Hundredths(_) | Self::Degrees)
     }
 
     /// Whole steps, not scaled by the format character.
     pub(super) const fn is_integer(self) -> bool {
-        matches!(
-            self,
-            Self::I8
-                | Self::U8
-                | Self::Mode
-                | Self::I16
-                | Self::U16
-                | Self::I32
-                | Self::U32
-                | Self::I64
-                | Self::U64
-        )
+        match self {
+            Self::Number(kind) => !matches!(kind, Kind::F32 | Kind::F64),
+            kind => matches!(kind, Self::Mode),
+        }
     }
 }
 
@@ -252,8 +221,8 @@ fn time_field(name: &str, fields: &[Field]) -> Option<TimeField> {
         let found = fields.iter().position(|field| field.name == label && kinds.contains(&field.kind))?;
         u8::try_from(found).ok()
     };
-    let micros = [FieldKind::U64, FieldKind::I64];
-    let millis = [FieldKind::U32, FieldKind::I32];
+    let micros = [Kind::U64, Kind::I64].map(FieldKind::Number);
+    let millis = [Kind::U32, Kind::I32].map(FieldKind::Number);
     if let Some(column) = at("TimeUS", &micros) {
         return Some(TimeField::Micros(column));
     }

@@ -3,8 +3,10 @@
 use std::borrow::Cow;
 
 use half::f16;
+use hums_dialect::Kind;
 
 use super::format::{Field, FieldKind, Format, TimeField};
+use crate::mavlink::values::Scalar;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Message<'a> {
@@ -50,7 +52,7 @@ impl<'a> Message<'a> {
     /// Finite.
     pub(super) fn single(&self, column: usize) -> Option<f32> {
         let single = match (self.body, self.field(column)?) {
-            (Body::Bytes(payload), Field { kind: FieldKind::Single, offset, .. }) => {
+            (Body::Bytes(payload), Field { kind: FieldKind::Number(Kind::F32), offset, .. }) => {
                 f32::from_le_bytes(*payload.get(*offset..)?.first_chunk()?)
             }
             _ => self.number(column)? as f32,
@@ -93,8 +95,10 @@ impl<'a> Message<'a> {
             Body::Bytes(payload) => {
                 let bytes = payload.get(field.offset..)?;
                 match field.kind {
-                    FieldKind::U64 => Some(u64::from_le_bytes(*bytes.first_chunk()?)),
-                    FieldKind::I64 => u64::try_from(i64::from_le_bytes(*bytes.first_chunk()?)).ok(),
+                    FieldKind::Number(Kind::U64) => Some(u64::from_le_bytes(*bytes.first_chunk()?)),
+                    FieldKind::Number(Kind::I64) => {
+                        u64::try_from(i64::from_le_bytes(*bytes.first_chunk()?)).ok()
+                    }
                     _ => whole(self.number(column)?).and_then(|number| u64::try_from(number).ok()),
                 }
             }
@@ -111,7 +115,7 @@ impl<'a> Message<'a> {
     pub(super) fn signed(&self, column: usize) -> Option<i64> {
         let field = self.field(column)?;
         match self.body {
-            Body::Bytes(payload) if field.kind == FieldKind::I64 => {
+            Body::Bytes(payload) if field.kind == FieldKind::Number(Kind::I64) => {
                 Some(i64::from_le_bytes(*payload.get(field.offset..)?.first_chunk()?))
             }
             Body::Bytes(_) => whole(self.number(column)?),
@@ -160,23 +164,13 @@ fn words(bytes: &[u8]) -> Cow<'_, str> {
 
 /// Exact, unlike multiplication by 0.01.
 fn number(kind: FieldKind, bytes: &[u8]) -> Option<f64> {
-    Some(match kind {
-        FieldKind::I8 => f64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
-        FieldKind::U8 | FieldKind::Mode => f64::from(*bytes.first()?),
-        FieldKind::I16 => f64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
-        FieldKind::U16 => f64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
-        FieldKind::I32 => f64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
-        FieldKind::U32 => f64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
-        FieldKind::I64 => i64::from_le_bytes(*bytes.first_chunk()?) as f64,
-        FieldKind::U64 => u64::from_le_bytes(*bytes.first_chunk()?) as f64,
-        FieldKind::Half => f64::from(f16::from_bits(u16::from_le_bytes(*bytes.first_chunk()?))),
-        FieldKind::Single => f64::from(f32::from_le_bytes(*bytes.first_chunk()?)),
-        FieldKind::Double => f64::from_le_bytes(*bytes.first_chunk()?),
-        FieldKind::CentiI16 => f64::from(i16::from_le_bytes(*bytes.first_chunk()?)) / 100.0,
-        FieldKind::CentiU16 => f64::from(u16::from_le_bytes(*bytes.first_chunk()?)) / 100.0,
-        FieldKind::CentiI32 => f64::from(i32::from_le_bytes(*bytes.first_chunk()?)) / 100.0,
-        FieldKind::CentiU32 => f64::from(u32::from_le_bytes(*bytes.first_chunk()?)) / 100.0,
-        FieldKind::Degrees => f64::from(i32::from_le_bytes(*bytes.first_chunk()?)) / 1e7,
-        FieldKind::Text(_) | FieldKind::Array => return None,
-    })
+    let read = |kind| Scalar::read(kind, bytes).map(Scalar::as_f64);
+    match kind {
+        FieldKind::Number(kind) => read(kind),
+        FieldKind::Mode => read(Kind::U8),
+        FieldKind::Half => Some(f16::from_bits(u16::from_le_bytes(*bytes.first_chunk()?)).into()),
+        FieldKind::Hundredths(kind) => Some(read(kind)? / 100.0),
+        FieldKind::Degrees => Some(read(Kind::I32)? / 1e7),
+        FieldKind::Text(_) | FieldKind::Array => None,
+    }
 }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use hums_core::clock::Instant;
-use hums_core::observation::Source;
 use hums_link::alert;
 
 use super::ahead::Ahead;
@@ -14,19 +13,15 @@ use super::definition::{byte, definition, is_of_itself, words};
 use super::epoch::Epoch;
 use super::format::{Defined, Format, Formats, Lengths, Role};
 use super::message::{Body, Message};
-use super::observe::{self, Craft, Handlers, Out, Say, Standing, State};
+use super::observe::{self, Handlers, Out, SOURCE, Standing, State};
 use super::stamp::receiver_us;
 use super::table::{self, Tables};
-use crate::plural::count;
 use crate::source::clock::WrongTimes;
 use crate::source::item::{
-    Amount, Cause, Event, Fact, FactKind, Gap, Item, ItemSink, MessageCount, Mode, Needs, Parameter,
-    RecordingSummary, Row, Rows, Table, Text, hand_said,
+    Amount, Cause, Fact, FactKind, Gap, Item, ItemSink, MessageCount, Needs, Parameter, RecordingSummary,
+    Row, Rows, Table, Text, hand_said,
 };
 use crate::source::pace::Pace;
-
-/// The autopilot.
-const SOURCE: Source = Source { system: 1, component: 1 };
 
 /// Later messages count as the last log's.
 const JOINTS_MAX: u32 = 1_000;
@@ -395,13 +390,11 @@ impl<'w> Session<'w> {
         if let Some(standing) = later.take_if(|_| when.own == Own::Sound) {
             state.stand(standing);
         }
-        let craft = state.craft();
         let mut result = Ok(());
-        let mut said =
-            ReportSink { at: when.at, observations: want.observations, craft, epoch, firmware, take };
-        let mut hand = |say: &Say<'_>| {
+        let mut said = ReportSink { at: when.at, observations: want.observations, epoch, firmware, take };
+        let mut hand = |item: Item<'_>| {
             if result.is_ok() {
-                result = said.hand(say);
+                result = said.hand(item);
             }
         };
         let mut out = Out::new(&mut hand);
@@ -523,43 +516,27 @@ fn add(counts: &mut BTreeMap<String, (u64, u64)>, name: String, (count, bytes): 
 struct ReportSink<'a, 't> {
     at: Instant,
     observations: bool,
-    craft: Craft,
     epoch: &'a mut Epoch,
     firmware: &'a mut String,
     take: &'a mut ItemSink<'t>,
 }
 
 impl ReportSink<'_, '_> {
-    fn hand(&mut self, say: &Say<'_>) -> Result<()> {
-        let item = match *say {
-            Say::Observation(observation) if self.observations => Item::Observation(SOURCE, observation),
-            Say::Observation(_) => return Ok(()),
-            Say::Parameter(name, value) => Item::Parameter(Parameter { name, value }),
-            Say::Text(severity, words, alert) => Item::Text(Text { source: SOURCE, severity, words, alert }),
-            Say::Mode(number) => Item::Mode(Mode { number, name: self.craft.mode_name(number) }),
-            Say::Event(number, severity, words, alert) => {
-                Item::Event(Event { source: SOURCE, number, severity, words, alert })
-            }
-            Say::Arming(words) => Item::Fact(Fact { about: FactKind::Arming, words }),
-            Say::Failsafes(words) => Item::Fact(Fact { about: FactKind::Failsafes, words }),
-            Say::Emergency(words) => Item::Fact(Fact { about: FactKind::Emergency, words }),
-            Say::ProcessorFault(words) => Item::Fact(Fact { about: FactKind::ProcessorFault, words }),
-            Say::Frame(words) => Item::Fact(Fact { about: FactKind::Frame, words }),
-            Say::Firmware(words) if words == self.firmware => return Ok(()),
-            Say::Firmware(words) => {
+    fn hand(&mut self, item: Item<'_>) -> Result<()> {
+        let item = match item {
+            Item::Observation(..) if !self.observations => return Ok(()),
+            Item::Fact(Fact { about: FactKind::Firmware, words }) => {
+                if words == self.firmware {
+                    return Ok(());
+                }
                 words.clone_into(self.firmware);
-                Item::Fact(Fact { about: FactKind::Firmware, words })
+                item
             }
-            Say::Utc(utc_us) => match self.epoch.take(utc_us.saturating_sub(self.at.as_micros())) {
+            Item::Epoch(epoch_us) => match self.epoch.take(epoch_us) {
                 Some(epoch_us) => Item::Epoch(epoch_us),
                 None => return Ok(()),
             },
-            Say::Lost(messages) => {
-                let messages = count(messages, "message");
-                let words = format!("{messages} that the autopilot's logger had no room for");
-                let gap = Gap::new(Some(self.at), Cause::Lost, words);
-                return (self.take)(self.at, Item::Gap(&gap));
-            }
+            item => item,
         };
         hand_said(self.at, item, self.observations, self.take)
     }

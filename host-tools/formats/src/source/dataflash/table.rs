@@ -70,19 +70,11 @@ fn kind(format: &Format, field: FieldKind, is_words: bool) -> ColumnType {
     match field {
         FieldKind::Text(64) if format.name == FILE && !is_words => ColumnType::Bytes,
         FieldKind::Mode if is_words => ColumnType::Text,
-        FieldKind::Mode | FieldKind::U8 | FieldKind::U16 | FieldKind::U32 | FieldKind::U64 => {
-            ColumnType::Unsigned
-        }
-        FieldKind::I8 | FieldKind::I16 | FieldKind::I32 | FieldKind::I64 | FieldKind::Array => {
-            ColumnType::Signed
-        }
-        FieldKind::Half | FieldKind::Single => ColumnType::Single,
-        FieldKind::Double
-        | FieldKind::CentiI16
-        | FieldKind::CentiU16
-        | FieldKind::CentiI32
-        | FieldKind::CentiU32
-        | FieldKind::Degrees => ColumnType::Double,
+        FieldKind::Number(kind) => ColumnType::of(kind),
+        FieldKind::Mode => ColumnType::Unsigned,
+        FieldKind::Array => ColumnType::Signed,
+        FieldKind::Half => ColumnType::Single,
+        FieldKind::Hundredths(_) | FieldKind::Degrees => ColumnType::Double,
         FieldKind::Text(_) => ColumnType::Text,
     }
 }

@@ -79,6 +79,6 @@ impl<'a> Fields<'a> {
         let slot = (*self.slots.get(field)?)?;
         let at = slot.offset as usize;
         let bytes = self.data.get(at..at + slot.count as usize)?;
-        (slot.number == Number::Char).then(|| words(bytes))
+        (slot.number == Number::CHAR).then(|| words(bytes))
     }
 }

@@ -8,6 +8,9 @@ use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
+use hums_dialect::Kind;
+
+use crate::mavlink::values::Scalar;
 use crate::source::item::CellValue;
 
 /// Formats in one log. PX4 has some 250.
@@ -23,63 +26,45 @@ const FIELDS_MAX: usize = 32_768;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
+    Of(Kind),
     Bool,
-    Char,
 }
 
 impl Number {
+    /// Several are a text.
+    pub(super) const CHAR: Self = Self::Of(Kind::Char);
+
     pub(super) fn named(name: &str) -> Option<Self> {
-        Some(match name {
-            "int8_t" => Self::I8,
-            "uint8_t" => Self::U8,
-            "int16_t" => Self::I16,
-            "uint16_t" => Self::U16,
-            "int32_t" => Self::I32,
-            "uint32_t" => Self::U32,
-            "int64_t" => Self::I64,
-            "uint64_t" => Self::U64,
-            "float" => Self::F32,
-            "double" => Self::F64,
-            "bool" => Self::Bool,
-            "char" => Self::Char,
+        Some(Self::Of(match name {
+            "int8_t" => Kind::I8,
+            "uint8_t" => Kind::U8,
+            "int16_t" => Kind::I16,
+            "uint16_t" => Kind::U16,
+            "int32_t" => Kind::I32,
+            "uint32_t" => Kind::U32,
+            "int64_t" => Kind::I64,
+            "uint64_t" => Kind::U64,
+            "float" => Kind::F32,
+            "double" => Kind::F64,
+            "char" => Kind::Char,
+            "bool" => return Some(Self::Bool),
             _ => return None,
-        })
+        }))
     }
 
     pub(super) const fn bytes(self) -> usize {
         match self {
-            Self::I8 | Self::U8 | Self::Bool | Self::Char => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
+            Self::Of(kind) => kind.size(),
+            Self::Bool => 1,
         }
     }
 
     /// A value of as many bytes as the type has; the code of a character.
     pub(super) fn value(self, bytes: &[u8]) -> Option<CellValue<'static>> {
-        Some(match self {
-            Self::U8 | Self::Char => CellValue::Unsigned(u64::from(*bytes.first()?)),
-            Self::I8 => CellValue::Signed(i64::from(i8::from_le_bytes(*bytes.first_chunk()?))),
-            Self::U16 => CellValue::Unsigned(u64::from(u16::from_le_bytes(*bytes.first_chunk()?))),
-            Self::I16 => CellValue::Signed(i64::from(i16::from_le_bytes(*bytes.first_chunk()?))),
-            Self::U32 => CellValue::Unsigned(u64::from(u32::from_le_bytes(*bytes.first_chunk()?))),
-            Self::I32 => CellValue::Signed(i64::from(i32::from_le_bytes(*bytes.first_chunk()?))),
-            Self::U64 => CellValue::Unsigned(u64::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I64 => CellValue::Signed(i64::from_le_bytes(*bytes.first_chunk()?)),
-            Self::F32 => CellValue::Single(f32::from_le_bytes(*bytes.first_chunk()?)),
-            Self::F64 => CellValue::Double(f64::from_le_bytes(*bytes.first_chunk()?)),
-            Self::Bool => CellValue::Flag(*bytes.first()? != 0),
-        })
+        match self {
+            Self::Of(kind) => Scalar::read(kind, bytes).map(CellValue::from),
+            Self::Bool => bytes.first().map(|byte| CellValue::Flag(*byte != 0)),
+        }
     }
 }
 
@@ -206,7 +191,9 @@ impl Formats {
             .unwrap_or(0);
         let timestamp = fields
             .iter()
-            .find(|field| field.name == "timestamp" && field.number == Number::U64 && field.array.is_none())
+            .find(|field| {
+                field.name == "timestamp" && field.number == Number::Of(Kind::U64) && field.array.is_none()
+            })
             .map(|field| field.offset);
         let least_bytes = bytes.saturating_sub(padding);
         Ok(Arc::new(Layout { name: name.to_owned(), fields, bytes, least_bytes, timestamp }))
@@ -263,7 +250,7 @@ impl Walk<'_> {
             return Ok(());
         }
         // An array has a column for each element.
-        self.take(if number == Number::Char { 0 } else { field.array.unwrap_or(1) as usize - 1 })?;
+        self.take(if number == Number::CHAR { 0 } else { field.array.unwrap_or(1) as usize - 1 })?;
         self.fields.push(Field { name: path, number, array: field.array, offset });
         Ok(())
     }

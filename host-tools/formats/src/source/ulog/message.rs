@@ -80,7 +80,7 @@ impl<'a> Keyed<'a> {
     }
 
     pub(super) fn words(&self) -> Option<&'a str> {
-        (self.number == Some(Number::Char)).then(|| words(self.value))
+        (self.number == Some(Number::CHAR)).then(|| words(self.value))
     }
 }
 

@@ -48,7 +48,7 @@ pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<C
     values.push(CellValue::Unsigned(u64::from(instance)));
     for field in &layout.fields {
         let (at, bytes) = (field.offset as usize, field.number.bytes());
-        if field.number == Number::Char {
+        if field.number == Number::CHAR {
             let text = data.get(at..at + field.array.unwrap_or(1) as usize);
             values.push(text.map_or(CellValue::Unknown, |text| CellValue::Text(words(text))));
             continue;
@@ -63,17 +63,14 @@ pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<C
 }
 
 fn elements(field: &Field) -> Option<u32> {
-    field.array.filter(|_| field.number != Number::Char)
+    field.array.filter(|_| field.number != Number::CHAR)
 }
 
 fn kind(number: Number) -> ColumnType {
     match number {
-        Number::U8 | Number::U16 | Number::U32 | Number::U64 => ColumnType::Unsigned,
-        Number::I8 | Number::I16 | Number::I32 | Number::I64 => ColumnType::Signed,
-        Number::F32 => ColumnType::Single,
-        Number::F64 => ColumnType::Double,
+        Number::CHAR => ColumnType::Text,
+        Number::Of(kind) => ColumnType::of(kind),
         Number::Bool => ColumnType::Flag,
-        Number::Char => ColumnType::Text,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use hums_core::clock::Instant;
 
-use super::say::Out;
+use super::out::Out;
 use super::state::State;
 use crate::source::dataflash::format::{Field, FieldKind};
 use crate::source::dataflash::message::Message;

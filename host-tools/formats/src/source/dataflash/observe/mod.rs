@@ -7,9 +7,9 @@
 mod arming;
 mod handler;
 mod motion;
+mod out;
 mod power;
 mod said;
-mod say;
 mod state;
 mod system;
 mod words;
@@ -17,9 +17,8 @@ mod words;
 use hums_core::clock::Instant;
 
 use self::handler::{Given, Handler, Slots};
-pub(super) use self::say::{Out, Say};
+pub(super) use self::out::{Out, SOURCE};
 pub(super) use self::state::{Standing, State};
-pub(super) use self::words::Craft;
 pub(in crate::source) use self::words::is_firmware;
 pub use self::words::mode_name;
 use super::format::Format;

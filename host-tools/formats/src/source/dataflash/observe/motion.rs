@@ -14,9 +14,10 @@ use hums_core::units::{
 };
 
 use super::handler::{Given, Handler, handler};
-use super::say::{Out, Say};
+use super::out::Out;
 use super::state::{Rates, State};
 use super::words::Craft;
+use crate::source::item::Item;
 
 /// Bits of `MAV_SYS_STATUS_SENSOR`.
 const GYRO: u32 = 1;
@@ -216,7 +217,7 @@ fn time(state: &mut State, given: &Given<'_>, fix: u8, out: &mut Out<'_>) {
         return;
     }
     state.utc_said = Some(given.at);
-    out.say(&Say::Utc(utc_us));
+    out.item(Item::Epoch(utc_us.saturating_sub(given.at.as_micros())));
     if let Some(boot_ms) = boot_ms(given) {
         out.observe(&Observation::SystemTime(SystemTime { utc_micros: Some(utc_us), boot_ms }));
     }

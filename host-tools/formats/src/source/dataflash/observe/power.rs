@@ -6,7 +6,7 @@ use hums_core::observation::{
 use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts};
 
 use super::handler::{Given, Handler, handler};
-use super::say::Out;
+use super::out::Out;
 use super::state::State;
 
 /// Columns of BAT.

@@ -1,11 +1,14 @@
 //! Parameters, texts, modes, events, errors, arming.
 
+use hums_core::cause::Alert;
 use hums_link::alert;
 
 use super::handler::{Given, Handler, handler};
-use super::say::{Out, Say};
+use super::out::{Out, SOURCE};
 use super::state::{State, version_of};
 use super::words::{self, CRASH_CHECK, Craft};
+use crate::plural::count;
+use crate::source::item::{Cause, Event, FactKind, Gap, Item, Mode, Parameter};
 
 /// `MAV_SEVERITY_INFO`: MSG has no severity.
 const INFO: u8 = 6;
@@ -57,7 +60,7 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
             }
         }
     }
-    out.say(&Say::Parameter(&name, value));
+    out.item(Item::Parameter(Parameter { name: &name, value }));
 }
 
 fn capacity_of(name: &str) -> Option<usize> {
@@ -98,7 +101,7 @@ fn text(state: &mut State, words: &str, out: &mut Out<'_>) {
             identify(state, version);
         }
     } else if let Some(frame) = words.strip_prefix("Frame: ") {
-        out.say(&Say::Frame(frame));
+        out.fact(FactKind::Frame, frame);
     } else {
         match words {
             "Arming motors" | "ARMING MOTORS" | "Throttle armed" => state.arm(true),
@@ -107,7 +110,7 @@ fn text(state: &mut State, words: &str, out: &mut Out<'_>) {
         }
     }
     // A log keeps no severity.
-    out.say(&Say::Text(INFO, words, alert::of_text(None, words.as_bytes())));
+    out.text(INFO, words, alert::of_text(None, words.as_bytes()));
 }
 
 fn firmware(state: &mut State, craft: Craft, words: &str, out: &mut Out<'_>) {
@@ -115,7 +118,7 @@ fn firmware(state: &mut State, craft: Craft, words: &str, out: &mut Out<'_>) {
     if !(state.facts.craft == Craft::Heli && craft == Craft::Copter) {
         state.facts.craft = craft;
     }
-    out.say(&Say::Firmware(words));
+    out.fact(FactKind::Firmware, words);
 }
 
 fn identify(state: &mut State, firmware: u32) {
@@ -130,7 +133,7 @@ fn version(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         if let Some(craft) = Craft::of_firmware(&words) {
             firmware(state, craft, &words, out);
         } else {
-            out.say(&Say::Firmware(&words));
+            out.fact(FactKind::Firmware, &words);
         }
     }
     if let (Some(major), Some(minor), Some(patch)) = (given.byte(1), given.byte(2), given.byte(3)) {
@@ -144,7 +147,7 @@ fn mode(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let named = || given.text(1).and_then(|name| state.facts.craft.mode_number(&name));
     let Some(number) = numbered.and_then(|number| u32::try_from(number).ok()).or_else(named) else { return };
     state.mode = number;
-    out.say(&Say::Mode(number));
+    out.item(Item::Mode(Mode { number, name: state.craft().mode_name(number) }));
 }
 
 fn arm(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
@@ -167,7 +170,7 @@ fn event(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         28 => state.leave_ground(),
         _ => {}
     }
-    out.say(&Say::Event(number.into(), NOTICE, words::event(number), None));
+    tell_event(out, number.into(), NOTICE, words::event(number), None);
 }
 
 fn error(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
@@ -177,12 +180,16 @@ fn error(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         state.failsafes = if code == 0 { state.failsafes & !bit } else { state.failsafes | bit };
     }
     if subsystem == CRASH_CHECK && code != 0 {
-        out.say(&Say::Emergency(words::subsystem(CRASH_CHECK)));
+        out.fact(FactKind::Emergency, words::subsystem(CRASH_CHECK));
     }
     let severity = if code == 0 { NOTICE } else { ERROR };
     let number = u32::from(subsystem) << 8 | u32::from(code);
     let alert = words::alert(subsystem, code);
-    out.say(&Say::Event(number, severity, &words::error(subsystem, code), alert));
+    tell_event(out, number, severity, &words::error(subsystem, code), alert);
+}
+
+fn tell_event(out: &mut Out<'_>, number: u32, severity: u8, words: &str, alert: Option<Alert>) {
+    out.item(Item::Event(Event { source: SOURCE, number, severity, words, alert }));
 }
 
 /// Written once, after the watchdog's restart (`AP_Scheduler`, `persistent_data`). The fault's number is the
@@ -195,7 +202,7 @@ fn watchdog(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         Some(6) => ", after a usage fault",
         _ => "",
     };
-    out.say(&Say::ProcessorFault(&format!("the watchdog restarted the autopilot{fault}")));
+    out.fact(FactKind::ProcessorFault, &format!("the watchdog restarted the autopilot{fault}"));
 }
 
 /// Messages without room in the logger.
@@ -205,7 +212,8 @@ fn dropped(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     if let Some(more) =
         state.messages_lost.and_then(|before| lost.checked_sub(before)).filter(|more| *more > 0)
     {
-        out.say(&Say::Lost(more));
+        let words = format!("{} that the autopilot's logger had no room for", count(more, "message"));
+        out.item(Item::Gap(&Gap::new(Some(given.at), Cause::Lost, words)));
     }
     state.messages_lost = Some(lost);
 }

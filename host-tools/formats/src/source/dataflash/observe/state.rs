@@ -8,9 +8,10 @@ use hums_core::observation::{
 use hums_core::units::{Amperes, Fraction, Gauss, Metres, RadiansPerSecond, Volts};
 
 use super::arming::{Arming, Word};
-use super::say::{Out, Say};
+use super::out::Out;
 use super::words::{self, Craft, name_and_version};
 use crate::source::dataflash::format::Format;
+use crate::source::item::FactKind;
 
 /// The log has only changes; `HEARTBEAT` and `SYS_STATUS` come at 1 Hz or faster.
 const SAID_EVERY: Span = Span::from_millis(500);
@@ -366,7 +367,7 @@ impl State {
     /// Heartbeat, status, landed state.
     pub(in crate::source::dataflash) fn repeat(&mut self, now: Instant, out: &mut Out<'_>) {
         if std::mem::replace(&mut self.failsafes_said, self.failsafes) != self.failsafes {
-            out.say(&Say::Failsafes(&words::failsafes(self.failsafes)));
+            out.fact(FactKind::Failsafes, &words::failsafes(self.failsafes));
         }
         self.rearms = match self.rearms {
             Rearms::Begins => Rearms::Since(now),
@@ -385,7 +386,7 @@ impl State {
         let known =
             word == Word::Told || (word == Word::Unknown && self.facts.told_arming != ToldArming::Nowhere);
         if (!known || self.word_said.is_some()) && self.word_said.replace(word) != Some(word) {
-            out.say(&Say::Arming(word.words()));
+            out.fact(FactKind::Arming, word.words());
         }
         out.observe(&Observation::Heartbeat(heartbeat));
         let firmware = self.facts.version;

@@ -5,7 +5,7 @@ use hums_core::clock::Span;
 use hums_core::observation::{LandedState, Observation, RadioControl, TelemetryRadio};
 
 use super::handler::{Given, Handler, handler};
-use super::say::{Out, Say};
+use super::out::Out;
 use super::state::State;
 use super::words::Craft;
 
@@ -26,7 +26,7 @@ fn performance(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     if new != 0 {
         let alert = Alert { cause: Cause::Processor, urgency: Urgency::Warning };
         let words = format!("Internal errors {errors:#x}");
-        out.say(&Say::Text(WARNING, &words, Some(alert)));
+        out.text(WARNING, &words, Some(alert));
     }
     if let Some(permille) = given.single(0).filter(|permille| (0.0..=1_000.0).contains(permille)) {
         state.load.set(given.at, permille / 1e3);
