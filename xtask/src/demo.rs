@@ -1,5 +1,6 @@
 //! A flight through the whole system.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -80,20 +81,14 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     }
     fs::create_dir_all(&folder)?;
 
-    let (card, gs, figures) = (folder.join("card.img"), folder.join("gs.bin"), folder.join("run.json"));
-    let pipeline = match image {
-        Some(image) => Shell::new(hums::program()).arg("sim").arg("--firmware").arg(image),
-        None => Shell::new(hums::program()).arg("sim"),
-    };
+    let (card, page) = (folder.join("card.img"), folder.join("report.html"));
+    let hums = || Shell::new(hums::program());
+    let firmware = image.into_iter().flat_map(|image| [OsStr::new("--firmware"), image.as_os_str()]);
     let recording = Instant::now();
     let flight = options.flight()?;
-    let json = record(pipeline, &flight, &card, &gs)?;
-    fs::write(&figures, &json)?;
+    let sim = hums().args(["sim", "--json"]).args(firmware).arg(&flight).arg("--sd").arg(&card);
+    let json = done(sim).context("hums sim failed; its messages are above")?;
     let recorded = recording.elapsed();
-    let (decoded, page) = (folder.join("decoded"), folder.join("report.html"));
-    let hums = || Shell::new(hums::program());
-    done(hums().args(["decode", "--format", "tlog,csv", "-o"]).arg(&decoded).arg(&card))
-        .context("the card cannot be decoded")?;
     done(hums().args(["report", "-o"]).arg(&page).arg(&card)).context("the report cannot be made")?;
     let (verdict, _) = hums().arg("check").arg(&card).output_and_code()?;
 
@@ -116,11 +111,8 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     );
     println!("the flight   {}", repo::shown(&flight));
     println!("it took      {built} s to build, {recorded} s to record");
-    for (label, path) in
-        [("the report", &page), ("the card", &card), ("for tools", &decoded), ("figures", &figures)]
-    {
-        println!("{label:<12} {}", repo::shown(path));
-    }
+    println!("the report   {}", repo::shown(&page));
+    println!("the card     {}", repo::shown(&card));
     if run.get("frames_lost").and_then(serde_json::Value::as_u64) != Some(0) {
         bail!("the simulated box lost frames; the report above has the times");
     }
@@ -137,13 +129,6 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
 /// Verdict, vehicle, worst finding: two paragraphs.
 fn shortened(verdict: &str) -> impl Iterator<Item = &str> {
     verdict.split("\n\n").take(2).flat_map(str::lines).take(VERDICT_LINES_MAX)
-}
-
-/// Returns its figures.
-fn record(pipeline: Shell, flight: &Path, card: &Path, gs: &Path) -> Result<String> {
-    let paths = [flight.as_os_str(), "--sd".as_ref(), card.as_os_str()];
-    done(pipeline.arg("--json").args(paths).arg("--gs").arg(gs))
-        .context("hums sim --firmware failed; its messages are above")
 }
 
 /// Losses, or an end in the air, are no failure.

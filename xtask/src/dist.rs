@@ -4,6 +4,7 @@
 //! ([`firmware::flags`], [`firmware::files`]). `--check` compares two builds in two places, runs the unit tests, and the
 //! Windows program under Wine.
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -87,7 +88,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let different = differences(&files, &again);
     if !different.is_empty() {
         write_all(&repo::target().join("dist-again"), &again)?;
-        bail!("built again elsewhere these differ: {}; they are in target/dist-again", different.join(", "));
+        bail!("built again elsewhere these differ: {different:?}; they are in target/dist-again");
     }
     println!("built again in {}: all {} files are the same", elsewhere.display(), files.len());
     Ok(())
@@ -344,14 +345,9 @@ pub(crate) fn sums(files: &[File]) -> String {
     })
 }
 
-fn differences(one: &[File], other: &[File]) -> Vec<String> {
-    let missing = |from: &[File], file: &File| !from.contains(file);
-    let mut names: Vec<String> =
-        one.iter().filter(|file| missing(other, file)).map(|(name, _)| name.clone()).collect();
-    names.extend(other.iter().filter(|file| missing(one, file)).map(|(name, _)| name.clone()));
-    names.sort_unstable();
-    names.dedup();
-    names
+fn differences<'a>(one: &'a [File], other: &'a [File]) -> BTreeSet<&'a str> {
+    let [one, other] = [one, other].map(BTreeSet::from_iter);
+    one.symmetric_difference(&other).map(|&file| file.0.as_str()).collect()
 }
 
 #[cfg(test)]
@@ -373,8 +369,9 @@ mod tests {
     fn one_byte_or_one_file_more_is_a_difference() {
         let one = [file("a", b"1"), file("b", b"2")];
         assert!(differences(&one, &one).is_empty());
-        assert_eq!(differences(&one, &[file("a", b"1"), file("b", b"3")]), ["b"]);
-        assert_eq!(differences(&one, &one[..1]), ["b"]);
-        assert_eq!(differences(&one[..1], &one), ["b"]);
+        let b = BTreeSet::from(["b"]);
+        assert_eq!(differences(&one, &[file("a", b"1"), file("b", b"3")]), b);
+        assert_eq!(differences(&one, &one[..1]), b);
+        assert_eq!(differences(&one[..1], &one), b);
     }
 }
