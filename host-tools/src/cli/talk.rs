@@ -80,6 +80,9 @@ pub struct Link {
     /// MAVLink system id of the vehicle. Needed only if several vehicles are on the link
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     pub system: Option<u8>,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What to do with parameters.
@@ -90,9 +93,6 @@ pub enum ParamsAction {
         /// The address of the box.
         #[command(flatten)]
         at: Link,
-        /// Print the result as one JSON object (docs/json.md)
-        #[arg(long)]
-        json: bool,
     },
     /// Read some parameters
     Get {
@@ -102,9 +102,6 @@ pub enum ParamsAction {
         /// The address of the box.
         #[command(flatten)]
         at: Link,
-        /// Print the result as one JSON object (docs/json.md)
-        #[arg(long)]
-        json: bool,
     },
     /// Send the box the signing key of --key, over the port that the parameter `SIGN_PORT` trusts
     Sign {
@@ -114,9 +111,6 @@ pub enum ParamsAction {
         /// Remove the box's signing key
         #[arg(long)]
         remove: bool,
-        /// Print the result as one JSON object (docs/json.md)
-        #[arg(long)]
-        json: bool,
     },
     /// Set a parameter; fails if the box keeps another value
     Set {
@@ -129,9 +123,6 @@ pub enum ParamsAction {
         /// The address of the box.
         #[command(flatten)]
         at: Link,
-        /// Print the result as one JSON object (docs/json.md)
-        #[arg(long)]
-        json: bool,
     },
 }
 
@@ -170,9 +161,6 @@ pub struct Pull {
     /// With --around: seconds before and after that moment
     #[arg(long, value_name = "S", default_value = "30", value_parser = span, requires = "around")]
     pub span: Span,
-    /// Print the result as one JSON object (docs/json.md)
-    #[arg(long)]
-    pub json: bool,
 }
 
 fn span(text: &str) -> Result<Span, String> {
@@ -273,9 +261,6 @@ pub struct FormatCard {
     /// Confirm that all files on the card are erased
     #[arg(long)]
     pub yes: bool,
-    /// Print the result as one JSON object (docs/json.md)
-    #[arg(long)]
-    pub json: bool,
 }
 
 const CARD_READER_EXAMPLES: &str = "Examples:
@@ -292,9 +277,6 @@ pub struct CardReader {
     /// The address of the box.
     #[command(flatten)]
     pub at: Link,
-    /// Print the result as one JSON object (docs/json.md)
-    #[arg(long)]
-    pub json: bool,
 }
 
 const SETUP_EXAMPLES: &str = "Examples:
@@ -328,16 +310,13 @@ pub struct Setup {
     /// Set the values of a file that --undo wrote, and nothing else
     #[arg(long, value_name = "FILE", conflicts_with_all = ["set", "json"])]
     pub restore: Option<PathBuf>,
-    /// Print the result as one JSON object (docs/json.md)
-    #[arg(long)]
-    pub json: bool,
 }
 
 impl Setup {
     /// For the page.
     pub const fn of_page(link: Endpoint, port: u8) -> Self {
-        let at = Link { link, key: None, system: None };
-        Self { at, board: None, port, set: false, undo: None, restore: None, json: true }
+        let at = Link { link, key: None, system: None, json: true };
+        Self { at, board: None, port, set: false, undo: None, restore: None }
     }
 }
 

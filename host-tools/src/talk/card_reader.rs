@@ -32,7 +32,7 @@ pub fn run(args: &cli::CardReader) -> Result<Outcome> {
     let mut client = Client::connect_alone(&args.at)?;
     let system = client.system();
     tell(&mut client).with_context(|| format!("system {system}"))?;
-    if args.json {
+    if args.at.json {
         output::json(SCHEMA, &CardReaderJson { system, restarts: true })?;
     } else {
         output::line(&format!(

@@ -40,7 +40,7 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     let mut client = Client::connect_alone(&args.at)?;
     let system = client.system();
     format(&mut client, SILENCE, LIMIT).with_context(|| format!("system {system}"))?;
-    if args.json {
+    if args.at.json {
         output::json(SCHEMA, &FormattedJson { system, formatted: true })?;
     } else {
         output::line(&format!("system {system}: formatted, and recorded on"))?;

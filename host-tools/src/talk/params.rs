@@ -43,36 +43,36 @@ pub(super) struct Param {
 /// Runs `hums box params`.
 pub fn run(args: &cli::Params) -> Result<Outcome> {
     match &args.action {
-        ParamsAction::List { at, json } => {
+        ParamsAction::List { at } => {
             let mut client = Client::connect(at)?;
             let system = client.system();
             let (values, wrong) = list(&mut client)?;
-            show(system, values, *json)?;
+            show(system, values, at.json)?;
             for why in &wrong {
                 note!("system {system}: {why}");
             }
             return Ok(Outcome::lossy(!wrong.is_empty()));
         }
-        ParamsAction::Get { names, at, json } => {
+        ParamsAction::Get { names, at } => {
             let mut client = Client::connect(at)?;
             let system = client.system();
             let values = names.iter().map(|name| read(&mut client, name));
-            if *json {
+            if at.json {
                 show(system, values.collect::<Result<Vec<_>>>()?, true)?;
             } else {
                 // A later one may fail.
                 values.into_iter().try_for_each(|value| show(system, [value?], false))?;
             }
         }
-        ParamsAction::Sign { at, remove, json } => {
+        ParamsAction::Sign { at, remove } => {
             let system = sign(at, *remove)?;
-            if *json {
+            if at.json {
                 output::json(SIGNED, &KeyJson { system, has_key: !*remove })?;
             } else {
                 output::line(if *remove { "key removed" } else { "key set" })?;
             }
         }
-        ParamsAction::Set { name, value, at, json } => {
+        ParamsAction::Set { name, value, at } => {
             let (wanted, is_rounded) = single(*value).with_context(|| name.clone())?;
             if is_rounded {
                 note!("{name}: {value} is rounded to {wanted}: a parameter has single precision");
@@ -83,7 +83,7 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
             if kept.value.to_bits() != wanted.to_bits() {
                 bail!("system {system}: {name}: the box refused {wanted} and keeps {}", kept.value);
             }
-            show(system, [kept], *json)?;
+            show(system, [kept], at.json)?;
         }
     }
     Ok(Outcome::Done)

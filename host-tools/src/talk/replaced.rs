@@ -55,7 +55,8 @@ pub fn run(args: &cli::Replaced) -> Result<Outcome> {
             (place, Some(write(card, place, serial, &old)?))
         }
         (None, Some(link)) => {
-            let at = Link { link: link.clone(), key: args.key.clone(), system: args.system };
+            let (link, key) = (link.clone(), args.key.clone());
+            let at = Link { link, key, system: args.system, json: args.json };
             let mut client = Client::connect_alone(&at)?;
             let place = on_board(&mut client, args.part, args.number)?;
             tell(&mut client, place, serial)?;

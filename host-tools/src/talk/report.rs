@@ -87,7 +87,7 @@ pub fn run(args: &cli::BoxReport) -> Result<Outcome> {
         }
     }
     if let Some(link) = &args.link {
-        let at = Link { link: link.clone(), key: None, system: args.system };
+        let at = Link { link: link.clone(), key: None, system: args.system, json: true };
         let newest = pull::newest(Client::connect(&at)?, pull::WHOLE_GROUP, |newest| {
             let pieces = newest.begin.pieces.iter().chain(&newest.end.pieces).cloned().collect();
             LogJson::of(&Log { pieces, ..newest.end.clone() })

@@ -94,7 +94,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     // Also the logs before an error.
     let judged = judge(&left_out, &mut pulled);
     let outcome = came?.and(judged?).and(listed);
-    if args.json {
+    if args.at.json {
         output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
     }
     Ok(outcome)
@@ -129,7 +129,7 @@ fn each(
             Ok(Some((path, is_new))) => {
                 if !is_new {
                     note!("{name}: is there already as {}: the same by its checksum", path.display());
-                } else if !args.json {
+                } else if !args.at.json {
                     output::line(&word(&path.display().to_string()))?;
                 }
                 pulled.push(LogJson::new(name, path, is_new));
@@ -173,7 +173,7 @@ fn around(
     logs.retain(|(log, _)| number(log) == newest);
     let around::Brought { files, at, found, outcome } =
         around::pull(ftp, &logs, &args.output, (moment, args.span))?;
-    if args.json {
+    if args.at.json {
         let around = MomentJson {
             time_s: at.as_secs_f64(),
             instance: found.as_ref().map(|found| found.instance),

@@ -129,7 +129,7 @@ struct HeardAutopilot {
 /// Runs `hums box setup`.
 pub fn run(args: &cli::Setup) -> Result<Outcome> {
     let board = args.board.as_deref().map(|name| hums_boards::find(name).map_err(usage)).transpose()?;
-    if let Some(board) = board.filter(|_| !args.json) {
+    if let Some(board) = board.filter(|_| !args.at.json) {
         output::line(&format!("wiring of {}, all grounds together, 3.3 V signals", board.title))?;
         let mut table = Table::new(2, [left(0), left(0)]);
         for Wiring { wire, pad } in wiring(board) {
@@ -143,7 +143,7 @@ pub fn run(args: &cli::Setup) -> Result<Outcome> {
         return settings::restore(&mut Client::connect_to(&args.at, &[AUTOPILOT])?, &values);
     }
     let found = check(Client::connect_to(&args.at, &HEARD).context(SILENT)?, args, board)?;
-    if args.json {
+    if args.at.json {
         output::json(SCHEMA, &found)?;
     } else {
         let mut table = Table::new(2, [left(7), left(0), left(0)]);
@@ -170,7 +170,7 @@ fn check(mut client: Client, args: &cli::Setup, mut board: Option<&'static Board
     if let Some(file) = &args.undo {
         settings::change(&mut client, &mut settings, file)?;
     }
-    if !args.json {
+    if !args.at.json {
         settings::show(heard, &settings)?;
     }
     client.turn_to(COMPONENT);
