@@ -1,7 +1,7 @@
 //! The monitor's own records and gaps as rows of tables.
 
 use hums_blackbox::Gap;
-use hums_blackbox::record::{Record, Stats};
+use hums_blackbox::record::Record;
 use hums_core::clock::Instant;
 
 use super::checked::{BOARD, finding_row};
@@ -95,7 +95,9 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
                 ("to[s]", Cell::Time(loss.to)),
             ],
         ),
-        Record::Stats(stats) => one("HUMS_STATS", stats_cells(stats)),
+        Record::Stats(stats) => {
+            one("HUMS_STATS", stats.named().map(|(name, number)| (name, count(number))).collect())
+        }
         Record::Fault(fault) => one(
             "HUMS_FAULT",
             vec![
@@ -142,35 +144,6 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         // A kind that this version of the host tools has no table for; the record itself stays in the log.
         _ => Vec::new(),
     }
-}
-
-fn stats_cells(stats: &Stats) -> Vec<(&'static str, Cell)> {
-    vec![
-        ("frames_in", count(stats.frames_in)),
-        ("frames_logged", count(stats.frames_logged)),
-        ("frames_lost", count(stats.frames_lost)),
-        ("bytes_in", count(stats.bytes_in)),
-        ("bytes_not_frames", count(stats.bytes_not_frames)),
-        ("bytes_logged", count(stats.bytes_logged)),
-        ("blocks_written", count(stats.blocks_written)),
-        ("queue_bytes_max", count(stats.queue_bytes_max)),
-        ("queue_bytes_capacity", count(stats.queue_bytes_capacity)),
-        ("sd_stall_ms_max", count(stats.sd_stall_ms_max)),
-        ("gs_frames", count(stats.gs_frames)),
-        ("gs_bytes", count(stats.gs_bytes)),
-        ("frame_queue_bytes_max", count(stats.frame_queue_bytes_max)),
-        ("frame_queue_bytes_capacity", count(stats.frame_queue_bytes_capacity)),
-        ("gs_queue_bytes_max", count(stats.gs_queue_bytes_max)),
-        ("gs_queue_bytes_capacity", count(stats.gs_queue_bytes_capacity)),
-        ("cpu_permille", count(stats.cpu_permille)),
-        ("cpu_permille_max", count(stats.cpu_permille_max)),
-        ("stack_bytes_max", count(stats.stack_bytes_max)),
-        ("stack_bytes_capacity", count(stats.stack_bytes_capacity)),
-        ("gs_frames_lost", count(stats.gs_frames_lost)),
-        ("autopilot_frames_lost", count(stats.autopilot_frames_lost)),
-        ("passed_frames_lost", count(stats.passed_frames_lost)),
-        ("requests_refused", count(stats.requests_refused)),
-    ]
 }
 
 /// A gap as a row.

@@ -57,6 +57,13 @@ macro_rules! statistics {
             $($(#[$doc])+ pub $name: u64,)+
         }
 
+        impl Stats {
+            /// Each number with its name, in stored order.
+            pub fn named(&self) -> impl Iterator<Item = (&'static str, u64)> {
+                [$((stringify!($name), self.$name)),+].into_iter()
+            }
+        }
+
         impl<'a> Field<'a> for Stats {
             fn numbers(&self, sink: &mut Sink<'_>) {
                 let numbers = [$(self.$name),+];

@@ -1,8 +1,9 @@
 //! The page: one HTML file with its style, its program and its data inside.
 
+use std::collections::BTreeMap;
+
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use hums_blackbox::record::Stats;
 use hums_core::clock::Instant;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
@@ -49,7 +50,7 @@ struct Data<'a> {
     counted_until_s: Option<f64>,
     /// The airframe's life is without this session.
     life_before: bool,
-    stats: Option<StatsJson>,
+    stats: Option<BTreeMap<&'static str, u64>>,
     /// Spectra of the inertial sensor.
     spectra: &'a [SpectrumJson],
     trend: &'a Trend,
@@ -64,45 +65,6 @@ pub struct PreviousRecording {
     pub name: String,
     /// The autopilot's parameters as they were at its end.
     pub values: Vec<(String, f64)>,
-}
-
-#[derive(Serialize)]
-struct StatsJson {
-    frames_in: u64,
-    frames_logged: u64,
-    frames_lost: u64,
-    bytes_in: u64,
-    bytes_not_frames: u64,
-    queue_bytes_max: u64,
-    queue_bytes_capacity: u64,
-    sd_stall_ms_max: u64,
-    gs_frames: u64,
-    gs_bytes: u64,
-    gs_frames_lost: u64,
-    autopilot_frames_lost: u64,
-    passed_frames_lost: u64,
-    requests_refused: u64,
-}
-
-impl From<&Stats> for StatsJson {
-    fn from(stats: &Stats) -> Self {
-        Self {
-            frames_in: stats.frames_in,
-            frames_logged: stats.frames_logged,
-            frames_lost: stats.frames_lost,
-            bytes_in: stats.bytes_in,
-            bytes_not_frames: stats.bytes_not_frames,
-            queue_bytes_max: stats.queue_bytes_max,
-            queue_bytes_capacity: stats.queue_bytes_capacity,
-            sd_stall_ms_max: stats.sd_stall_ms_max,
-            gs_frames: stats.gs_frames,
-            gs_bytes: stats.gs_bytes,
-            gs_frames_lost: stats.gs_frames_lost,
-            autopilot_frames_lost: stats.autopilot_frames_lost,
-            passed_frames_lost: stats.passed_frames_lost,
-            requests_refused: stats.requests_refused,
-        }
-    }
 }
 
 /// A session's page.
@@ -132,7 +94,7 @@ pub fn html(
         counted_until_s: log.counted_until().map(Instant::as_secs_f64),
         life_before: log.contents.is_life_before(),
         counters: counters::of(&log.contents.usage, &log.contents.lifetime),
-        stats: log.contents.stats.as_ref().map(StatsJson::from),
+        stats: log.contents.stats.as_ref().map(|stats| stats.named().collect()),
         spectra: &replay.spectra,
         trend,
         before,
