@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::path::Path;
 
 use hums::card::{Faults, SimCard};
-use hums::run::sim::power_on;
+use hums::run::sim::both_ports::{BoardSetup, Side, run};
 use hums::source::Chunk;
 use hums_core::parameters::Params;
 use hums_sdcard::Medium;
@@ -112,13 +112,20 @@ fn on_this_pc(image: &Path, phase_us: u64, to: &Path) -> (Vec<Value>, Vec<u8>) {
     let chunks = session
         .frames
         .into_iter()
-        .map(|(ms, bytes)| Chunk { at_us: (ms * 1_000 + 500).saturating_sub(phase_us), bytes });
+        .map(|(ms, bytes)| Chunk { at_us: (ms * 1_000 + 500).saturating_sub(phase_us), bytes })
+        .map(|chunk| (Side::Autopilot, chunk));
     let file = File::options().read(true).write(true).create_new(true).open(to).unwrap();
     file.set_len(4_096 * MIB).unwrap();
     let card = SimCard::new(file, Faults::default()).unwrap();
     assert!(hums_recorder::format::format(&card, 1).is_ok());
     let mut gs = Vec::new();
-    power_on(&card, &Params::defaults(), 1, &mut gs, chunks, |_| Ok(())).unwrap();
+    let board = BoardSetup { card: &card, params: &Params::defaults(), key: None, boots: 1 };
+    run(&board, chunks, |side, _, frame| {
+        if side == Side::Ground {
+            gs.extend(frame);
+        }
+    })
+    .unwrap();
     drop(card);
     (records(to, &[0, 3]), gs)
 }

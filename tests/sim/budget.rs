@@ -62,7 +62,7 @@ fn power_on(recording: &Path, budget: u32, ask: impl FnMut(u64) -> Vec<u8>) -> (
     hums_recorder::format::format(&card, 7).unwrap();
     let mut params = Params::defaults();
     params.set("GS_BUDGET", budget as f32).unwrap();
-    let board = BoardSetup { card: &card, params: &params, key: None };
+    let board = BoardSetup { card: &card, params: &params, key: None, boots: 1 };
     let mut sent = Vec::new();
     let outcome = run(&board, chunks(recording, ask), |side, at_us, bytes| {
         if side == Side::Ground {

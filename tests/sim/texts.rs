@@ -37,7 +37,7 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let card = SimCard::new(file, Faults::default()).unwrap();
     hums_recorder::format::format(&card, 7).unwrap();
     let params = Params::defaults();
-    let board = BoardSetup { card: &card, params: &params, key: None };
+    let board = BoardSetup { card: &card, params: &params, key: None, boots: 1 };
     let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
     let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
     let (mut chunks, mut now_us) = (Vec::new(), 0);

@@ -9,8 +9,8 @@ use anyhow::{Context as _, Result, anyhow, ensure};
 use hums::card::image::{ReadOnlyImage, open_or_make};
 use hums::card::{Faults, SimCard};
 use hums::logs::fat::{Volume, Walk};
-use hums::run::sim::{PowerOn, power_on};
-use hums_core::parameters::Params;
+use hums::run::sim::PowerOn;
+use hums::run::sim::both_ports::power_on;
 use hums_recorder::layout::Layout;
 use tempfile::TempDir;
 
@@ -45,7 +45,7 @@ impl Card {
 
     pub(super) fn record(&self, stream: &Stream, boots: u32) -> Result<PowerOn> {
         let device = self.device(Faults::default())?;
-        power_on(&device, &Params::defaults(), boots, &mut std::io::sink(), stream.chunks(), |_| Ok(()))
+        power_on(&device, boots, stream.chunks())
     }
 
     pub(super) fn content(&self) -> Result<Vec<u8>> {

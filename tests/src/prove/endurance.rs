@@ -1,14 +1,12 @@
 //! A day on a small card.
 
-use std::cell::Cell;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 use hums::card::Faults;
 use hums::logs::on_card;
-use hums::run::sim::power_on;
+use hums::run::sim::both_ports::power_on;
 use hums::source::Chunk;
-use hums_core::parameters::Params;
 
 use super::card::Card;
 use super::figures::{Figures, Labels};
@@ -64,27 +62,16 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let streams = form.flights.iter().map(open).collect::<Result<Vec<_>>>()?;
     let mut card = Card::new(form.card_mib)?;
     let device = card.device(Faults::default())?;
-    let (look_at, looked) = (Cell::new(seconds * 1_000_000 / looks), Cell::new(0_u64));
     let mut seen = Vec::new();
     let path = card.path();
-    let done = power_on(
-        &device,
-        &Params::defaults(),
-        1,
-        &mut std::io::sink(),
-        Day::new(&streams, seconds),
-        |chunk| {
-            if chunk.at_us < look_at.get() {
-                return Ok(());
-            }
-            looked.set(looked.get() + 1);
-            look_at.set((looked.get() + 1) * seconds * 1_000_000 / looks);
-            let about = look(&path, form, chunk.at_us)
-                .with_context(|| format!("after {} s", chunk.at_us / 1_000_000))?;
-            seen.push(about);
-            Ok(())
-        },
-    )?;
+    let chunks = Day::new(&streams, seconds).inspect(|chunk| {
+        if chunk.at_us >= (seen.len() as u64 + 1) * seconds * 1_000_000 / looks {
+            let about = look(&path, form, chunk.at_us);
+            seen.push(about.with_context(|| format!("after {} s", chunk.at_us / 1_000_000)));
+        }
+    });
+    let done = power_on(&device, 1, chunks)?;
+    let seen = seen.into_iter().collect::<Result<Vec<_>>>()?;
     card.check()?;
     let last = look(&path, form, seconds * 1_000_000).context("at the end")?;
     ensure!(done.stats.frames_lost == 0, "{} frames lost", done.stats.frames_lost);

@@ -174,7 +174,7 @@ fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half
     let params = params(key.is_some())?;
     let mut hostile = Hostile::new(options.seed ^ u64::from(key.is_some()));
     let (mut window, mut to_autopilot) = (Window::default(), ToAutopilot::default());
-    let board = BoardSetup { card: &device, params: &params, key };
+    let board = BoardSetup { card: &device, params: &params, key, boots: 1 };
     let outcome =
         power_on(&board, both_sides(&streams, seconds, &mut hostile), |side, at_us, frame| match side {
             Side::Ground => window.add(at_us, frame.len()),

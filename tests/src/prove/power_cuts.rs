@@ -13,9 +13,8 @@ use hums::card::faults::CardOut;
 use hums::card::sim::Written;
 use hums::logs::fat::CardFile;
 use hums::logs::{Log, on_card};
-use hums::run::sim::power_on;
+use hums::run::sim::both_ports::power_on;
 use hums_blackbox::Cause;
-use hums_core::parameters::Params;
 use rayon::prelude::*;
 
 use super::card::{BLOCK, Card};
@@ -216,9 +215,8 @@ impl Session {
         let out = scenario.out.map(|(from, to)| CardOut { from_us: micros(from), to_us: micros(to) });
         let device = card.device(Faults { outs: out.into_iter().collect(), ..Faults::default() })?;
         device.start_trace();
-        let params = Params::defaults();
         let boots = scenario.earlier + 1;
-        let done = power_on(&device, &params, boots, &mut std::io::sink(), stream.chunks(), |_| Ok(()))?;
+        let done = power_on(&device, boots, stream.chunks())?;
         ensure!(done.stats.frames_lost == 0 && done.frames_left == 0, "frames were lost: {:?}", done.stats);
         let trace = device.take_trace();
         ensure!(trace.len() > 200, "only {} block writes", trace.len());

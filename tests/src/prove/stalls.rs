@@ -4,9 +4,8 @@
 use anyhow::{Context as _, Result, ensure};
 use hums::card::Faults;
 use hums::card::faults::Stall;
-use hums::run::sim::power_on;
+use hums::run::sim::both_ports::power_on;
 use hums_blackbox::record::Stats;
-use hums_core::parameters::Params;
 use rayon::prelude::*;
 
 use super::card::Card;
@@ -75,7 +74,7 @@ fn stall(stream: &Stream, at_s: u64) -> Result<Stats> {
     let stall = Stall { from_us: at_s * 1_000_000, for_us: STALL_MS * 1_000 };
     let card = Card::new(256)?;
     let device = card.device(Faults { stalls: vec![stall], ..Faults::default() })?;
-    let done = power_on(&device, &Params::defaults(), 1, &mut std::io::sink(), stream.chunks(), |_| Ok(()))?;
+    let done = power_on(&device, 1, stream.chunks())?;
     let stats = done.stats;
     // The write begins a little before it.
     ensure!(stats.sd_stall_ms_max >= STALL_MS - 250, "the card never stood still");

@@ -37,6 +37,8 @@ pub struct BoardSetup<'a> {
     pub params: &'a Params,
     /// Its signing key.
     pub key: Option<[u8; 32]>,
+    /// Distinguishes power-ons on a card.
+    pub boots: u32,
 }
 
 /// A result with each change of level and its time.
@@ -50,8 +52,15 @@ pub struct Outcome {
     pub params: Params,
 }
 
+/// A power-on with an autopilot alone, and default parameters.
+pub fn power_on(card: &SimCard, boots: u32, chunks: impl IntoIterator<Item = Chunk>) -> Result<PowerOn> {
+    let board = BoardSetup { card, params: &Params::defaults(), key: None, boots };
+    let chunks = chunks.into_iter().map(|chunk| (Side::Autopilot, chunk));
+    Ok(run(&board, chunks, |_, _, _| ())?.done)
+}
+
 /// Both ports get their bytes in time. `told` gets each frame that leaves a port, with the time of the chunk before.
-/// For milliseconds, give a chunk each millisecond.
+/// For milliseconds, give a chunk each millisecond. A card whose power went ends it.
 pub fn run(
     board: &BoardSetup<'_>,
     chunks: impl IntoIterator<Item = (Side, Chunk)>,
@@ -75,18 +84,22 @@ pub fn run(
         findings: &mut keep,
         reboot_at_us: None,
     };
-    let mut pipeline = Pipeline::new(outside, &mut memory, identity(1), 1);
+    let mut pipeline = Pipeline::new(outside, &mut memory, identity(board.boots), board.boots);
     pipeline.start()?;
+    let mut goes_on = true;
     for (side, chunk) in chunks {
-        match side {
+        goes_on = match side {
             Side::Autopilot => pipeline.arrive(&chunk)?,
             Side::Ground => pipeline.hear(&chunk)?,
         };
+        if !goes_on {
+            break;
+        }
         for (side, port) in &ports {
             port.take().iter().for_each(|frame| told(*side, chunk.at_us, frame));
         }
     }
-    let frames_left = pipeline.finish()?;
+    let frames_left = if goes_on { pipeline.finish()? } else { 0 };
     let (stats, params) = (pipeline.stats(), pipeline.params());
     drop(pipeline);
     Ok(Outcome { done: PowerOn { stats, frames_left, card: memory.card_reading() }, findings, params })

@@ -26,14 +26,12 @@ use super::arrivals::Arrivals;
 use super::earlier::EarlierSessions;
 use super::ground::Ground;
 use super::report::{FINDINGS_MAX, RunReport};
-use super::store::{self, FileFlash};
+use super::store::FileFlash;
 use super::{Prepared, check_request, check_standard_output, check_store, drive, emulate, finish, prepare};
 use crate::card::image::is_card;
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::outcome::Outcome;
-use crate::run::Machine as _;
-use crate::source::Chunk;
 
 /// Runs `hums sim`.
 pub fn run(run: &cli::Sim) -> Result<Outcome> {
@@ -87,43 +85,6 @@ fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {
         keeps_table: is_card(&image)?,
     };
     SimCard::new(image, faults)
-}
-
-/// Records chunks on any card, as one power-on. `boots` distinguishes power-ons on a card.
-///
-/// `gs` gets the bytes for the ground station. `moment` is called before each chunk. A card whose power went ends it.
-pub fn power_on(
-    card: &SimCard,
-    params: &Params,
-    boots: u32,
-    gs: &mut (dyn Write + Send),
-    chunks: impl IntoIterator<Item = Chunk>,
-    mut moment: impl FnMut(&Chunk) -> Result<()>,
-) -> Result<PowerOn> {
-    let mut memory = Memory::new(params);
-    let mut autopilot = std::io::sink();
-    let outside = Outside {
-        slot: &Slot { card, power_on_us: 0 },
-        flash: &store::open(None, &[])?,
-        gs,
-        autopilot: &mut autopilot,
-        findings: &mut drop,
-        reboot_at_us: None,
-    };
-    let mut pipeline = Pipeline::new(outside, &mut memory, identity(boots), boots);
-    pipeline.start()?;
-    let mut ended = true;
-    for chunk in chunks {
-        moment(&chunk)?;
-        if !pipeline.arrive(&chunk)? {
-            ended = false;
-            break;
-        }
-    }
-    let frames_left = if ended { pipeline.finish()? } else { 0 };
-    let stats = pipeline.stats();
-    drop(pipeline);
-    Ok(PowerOn { stats, frames_left, card: memory.card_reading() })
 }
 
 /// A power-on's result.

@@ -16,11 +16,10 @@ use hums::ending::SessionBefore;
 use hums::followed::EndResolver;
 use hums::logs::sessions::Sessions;
 use hums::logs::{FoundLogs, find};
-use hums::run::sim::power_on;
+use hums::run::sim::both_ports::power_on;
 use hums::summary::Overview;
 use hums::verify::{Verdict, verdict};
 use hums_blackbox::Header;
-use hums_core::parameters::Params;
 use hums_recorder::status::CardState;
 use rayon::prelude::*;
 
@@ -398,14 +397,7 @@ impl Subject {
         let before: BTreeMap<_, _> = names().into_iter().flatten().collect();
         let device = card.device(hums::card::Faults::default())?;
         device.start_trace();
-        let done = power_on(
-            &device,
-            &Params::defaults(),
-            NEXT_BOOTS,
-            &mut std::io::sink(),
-            self.next.chunks(),
-            |_| Ok(()),
-        )?;
+        let done = power_on(&device, NEXT_BOOTS, self.next.chunks())?;
         let written: BTreeSet<_> = device.take_trace().into_iter().map(|write| write.block).collect();
         let after: BTreeMap<_, _> = names().into_iter().flatten().collect();
 
