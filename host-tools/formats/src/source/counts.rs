@@ -1,4 +1,4 @@
-//! MAVLink messages by id.
+//! Messages by id and by name.
 
 use std::collections::BTreeMap;
 
@@ -51,5 +51,24 @@ impl Counts {
             None if self.far.len() >= FAR_MAX && !self.far.contains_key(&key) => &mut self.other,
             None => self.far.entry(key).or_default(),
         }
+    }
+}
+
+/// Counted by themselves: a file may define names for ever.
+const NAMES_MAX: usize = 4_096;
+const OTHERS: &str = "others";
+
+/// Messages by name.
+#[derive(Debug, Default)]
+pub(super) struct NamedCounts(BTreeMap<String, Amount>);
+
+impl NamedCounts {
+    pub(super) fn add(&mut self, name: &str, amount: Amount) {
+        let room = self.0.len() < NAMES_MAX || self.0.contains_key(name);
+        self.0.entry(if room { name } else { OTHERS }.to_owned()).or_default().add(amount);
+    }
+
+    pub(super) fn messages(self) -> Vec<MessageCount> {
+        self.0.into_iter().map(|(name, amount)| MessageCount { id: None, name, amount }).collect()
     }
 }

@@ -1,6 +1,5 @@
 //! One reading of a log, message by message.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use anyhow::Result;
@@ -17,9 +16,10 @@ use super::observe::{self, Handlers, Out, SOURCE, Standing, State};
 use super::stamp::receiver_us;
 use super::table::{self, Tables};
 use crate::source::clock::WrongTimes;
+use crate::source::counts::NamedCounts;
 use crate::source::item::{
-    Amount, Cause, Fact, FactKind, Gap, Item, ItemSink, MessageCount, Needs, Parameter, RecordingSummary,
-    Row, Rows, Table, Text, hand_said,
+    Amount, Cause, Fact, FactKind, Gap, Item, ItemSink, Needs, RecordingSummary, Row, Rows, Table, Text,
+    hand_said,
 };
 use crate::source::pace::Pace;
 
@@ -163,8 +163,8 @@ pub(super) struct Session<'w> {
     tables: Tables,
     needed: Vec<Option<bool>>,
     /// Messages and bytes by type, and by former names.
-    counts: Vec<(u64, u64)>,
-    counts_before: BTreeMap<String, (u64, u64)>,
+    counts: Vec<Amount>,
+    counts_before: NamedCounts,
     epoch: Epoch,
     firmware: String,
     rows_refused: bool,
@@ -191,8 +191,8 @@ impl<'w> Session<'w> {
             handlers: Handlers::default(),
             tables: Tables::default(),
             needed: vec![None; 256],
-            counts: vec![(0, 0); 256],
-            counts_before: BTreeMap::new(),
+            counts: vec![Amount::default(); 256],
+            counts_before: NamedCounts::default(),
             epoch: Epoch::default(),
             firmware: first.banner.unwrap_or_default(),
             rows_refused: false,
@@ -235,8 +235,8 @@ impl<'w> Session<'w> {
     /// Another log has other types.
     fn count_by_name(&mut self) {
         for (kind, count) in (0..=u8::MAX).zip(&mut self.counts) {
-            if let Some(format) = self.formats.get(kind).filter(|_| count.0 > 0) {
-                add(&mut self.counts_before, format.name.clone(), std::mem::take(count));
+            if let Some(format) = self.formats.get(kind).filter(|_| count.count > 0) {
+                self.counts_before.add(&format.name, std::mem::take(count));
             }
         }
     }
@@ -267,9 +267,8 @@ impl<'w> Session<'w> {
     ) -> Result<()> {
         let index = usize::from(kind);
         self.unpaced += bytes;
-        if let Some((count, all)) = self.counts.get_mut(index) {
-            *count += 1;
-            *all += bytes;
+        if let Some(messages) = self.counts.get_mut(index) {
+            messages.add(Amount { count: 1, bytes });
         }
         match self.needed.get(index).copied().flatten() {
             Some(false) => return Ok(()),
@@ -319,7 +318,7 @@ impl<'w> Session<'w> {
         if defined == Some(Defined::New)
             && let Some((kind, name)) = before
         {
-            self.forget(kind, name);
+            self.forget(kind, &name);
         }
         match defined {
             Some(Defined::Refused(words)) => self.gap(Cause::Damaged, Some(place), 0, words, take),
@@ -334,14 +333,15 @@ impl<'w> Session<'w> {
         }
     }
 
-    fn forget(&mut self, kind: u8, name: String) {
+    fn forget(&mut self, kind: u8, name: &str) {
         if let Some(needed) = self.needed.get_mut(usize::from(kind)) {
             *needed = None;
         }
         self.handlers.forget(kind);
         let same = self.formats.get(kind).is_some_and(|format| format.name == name);
-        if let Some(count) = self.counts.get_mut(usize::from(kind)).filter(|_| !same) {
-            add(&mut self.counts_before, name, std::mem::take(count));
+        let count = self.counts.get_mut(usize::from(kind));
+        if let Some(count) = count.filter(|count| !same && count.count > 0) {
+            self.counts_before.add(name, std::mem::take(count));
         }
     }
 
@@ -483,10 +483,10 @@ impl<'w> Session<'w> {
         for gap in self.pace.gaps(&self.wrong) {
             take(self.clock.now(), Item::Gap(&gap))?;
         }
-        let messages: u64 = self.counts.iter().map(|(count, _)| count).sum();
+        let messages: u64 = self.counts.iter().map(|messages| messages.count).sum();
         // Unwanted messages are not followed.
-        let has_time = |(kind, (count, _)): (u8, &(u64, u64))| {
-            self.formats.get(kind).filter(|_| *count > 0).is_some_and(tells_time)
+        let has_time = |(kind, messages): (u8, &Amount)| {
+            self.formats.get(kind).filter(|_| messages.count > 0).is_some_and(tells_time)
         };
         let timed =
             self.joints > 0 || self.clock.has_begun() || (0..=u8::MAX).zip(&self.counts).any(has_time);
@@ -495,22 +495,9 @@ impl<'w> Session<'w> {
             self.gap(Cause::NoTimes, None, 0, words, take)?;
         }
         self.count_by_name();
-        let told = |(name, (count, bytes))| MessageCount { id: None, name, amount: Amount { count, bytes } };
-        let messages = self.counts_before.into_iter().map(told).collect();
+        let messages = self.counts_before.messages();
         Ok(RecordingSummary { messages, ..RecordingSummary::default() })
     }
-}
-
-/// A file may define names for ever.
-const NAMES_MAX: usize = 4_096;
-
-fn add(counts: &mut BTreeMap<String, (u64, u64)>, name: String, (count, bytes): (u64, u64)) {
-    if count == 0 || (counts.len() >= NAMES_MAX && !counts.contains_key(&name)) {
-        return;
-    }
-    let sum = counts.entry(name).or_default();
-    sum.0 += count;
-    sum.1 += bytes;
 }
 
 struct ReportSink<'a, 't> {

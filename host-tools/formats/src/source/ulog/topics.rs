@@ -7,6 +7,7 @@ use super::fields::{Slot, slots};
 use super::format::Layout;
 use super::px4::{self, Topic};
 use super::rows;
+use crate::source::counts::NamedCounts;
 use crate::source::item::{Amount, MessageCount, Rows, Table};
 
 /// At a time. PX4 has some 200.
@@ -15,9 +16,6 @@ const SUBSCRIPTIONS_MAX: usize = 4_096;
 const COLUMNS_MAX: usize = 32_768;
 /// Of one table. PX4's widest, a foreign array of bytes, has 300.
 const TABLE_COLUMNS_MAX: usize = 1_024;
-/// Counted; the rest together.
-const NAMES_MAX: usize = 4_096;
-const OTHERS: &str = "others";
 
 /// A topic's instance.
 #[derive(Debug)]
@@ -28,15 +26,13 @@ pub(super) struct Subscription {
     /// If rows are wanted.
     pub(super) table: Option<Arc<Table>>,
     pub(super) observed_us: Option<u64>,
-    count: u64,
-    bytes: u64,
+    messages: Amount,
 }
 
 impl Subscription {
     /// Returns the message's time, if any.
     pub(super) fn take(&mut self, data: &[u8], message_bytes: usize) -> Option<u64> {
-        self.count += 1;
-        self.bytes += message_bytes as u64;
+        self.messages.add(Amount { count: 1, bytes: message_bytes as u64 });
         self.time(data)
     }
 
@@ -56,7 +52,7 @@ pub(super) struct Subscriptions {
     /// Two topics may have one name (`a/b` and `a_b`).
     taken: BTreeSet<String>,
     columns: usize,
-    counted: BTreeMap<String, (u64, u64)>,
+    counted: NamedCounts,
 }
 
 impl Subscriptions {
@@ -101,8 +97,7 @@ impl Subscriptions {
             topic: topic.map(|topic| (topic, slots(layout, topic.fields))),
             table,
             observed_us: None,
-            count: 0,
-            bytes: 0,
+            messages: Amount::default(),
         };
         let place = usize::from(id);
         if self.numbered.len() <= place {
@@ -141,28 +136,19 @@ impl Subscriptions {
     pub(super) fn remove(&mut self, id: u16) {
         let Some(gone) = self.numbered.get_mut(usize::from(id)).and_then(Option::take) else { return };
         self.living -= 1;
-        self.count(&gone);
-    }
-
-    fn count(&mut self, gone: &Subscription) {
-        let name = &gone.layout.name;
-        let room = self.counted.len() < NAMES_MAX || self.counted.contains_key(name);
-        let counted = self.counted.entry(if room { name.as_str() } else { OTHERS }.to_owned()).or_default();
-        counted.0 += gone.count;
-        counted.1 += gone.bytes;
+        self.counted.add(&gone.layout.name, gone.messages);
     }
 
     /// Another log begins.
     pub(super) fn clear(&mut self) {
         for gone in std::mem::take(&mut self.numbered).into_iter().flatten() {
-            self.count(&gone);
+            self.counted.add(&gone.layout.name, gone.messages);
         }
         self.living = 0;
     }
 
     pub(super) fn counts(mut self) -> Vec<MessageCount> {
         self.clear();
-        let of = |(name, (count, bytes))| MessageCount { id: None, name, amount: Amount { count, bytes } };
-        self.counted.into_iter().map(of).collect()
+        self.counted.messages()
     }
 }
