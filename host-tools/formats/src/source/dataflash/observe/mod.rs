@@ -14,6 +14,8 @@ mod state;
 mod system;
 mod words;
 
+use std::cell::OnceCell;
+
 use hums_core::clock::Instant;
 
 use self::handler::{Given, Handler, Slots};
@@ -44,44 +46,28 @@ pub(super) struct ResolvedHandler {
 
 #[derive(Debug)]
 pub(super) struct Handlers {
-    by_kind: Vec<HandlerLookup>,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum HandlerLookup {
-    NotYet,
-    /// There is none.
-    Nothing,
-    Found(ResolvedHandler),
+    /// Looked up once.
+    by_kind: Vec<OnceCell<Option<ResolvedHandler>>>,
 }
 
 impl Default for Handlers {
     fn default() -> Self {
-        Self { by_kind: vec![HandlerLookup::NotYet; 256] }
+        Self { by_kind: vec![OnceCell::new(); 256] }
     }
 }
 
 impl Handlers {
-    pub(super) fn of(&mut self, format: &Format) -> Option<&ResolvedHandler> {
-        let slot = self.by_kind.get_mut(usize::from(format.kind))?;
-        if matches!(slot, HandlerLookup::NotYet) {
-            *slot = handler(&format.name).map_or(HandlerLookup::Nothing, |(handler, base)| {
-                HandlerLookup::Found(ResolvedHandler {
-                    handler,
-                    slots: handler.resolve(&format.fields),
-                    base,
-                })
-            });
-        }
-        match slot {
-            HandlerLookup::Found(resolved) => Some(resolved),
-            HandlerLookup::NotYet | HandlerLookup::Nothing => None,
-        }
+    pub(super) fn of(&self, format: &Format) -> Option<&ResolvedHandler> {
+        let resolve = || {
+            let (handler, base) = handler(&format.name)?;
+            Some(ResolvedHandler { handler, slots: handler.resolve(&format.fields), base })
+        };
+        self.by_kind.get(usize::from(format.kind))?.get_or_init(resolve).as_ref()
     }
 
     pub(super) fn forget(&mut self, kind: u8) {
         if let Some(slot) = self.by_kind.get_mut(usize::from(kind)) {
-            *slot = HandlerLookup::NotYet;
+            slot.take();
         }
     }
 }
