@@ -107,9 +107,33 @@ struct State<'a> {
     cells: Vec<f32>,
     board: &'a [board::SubsystemState],
     usage: Vec<Value>,
-    components: Vec<Value>,
-    link: Value,
+    components: Vec<ComponentJson>,
+    link: LinkJson,
     companion: Option<CompanionJson>,
+}
+
+// Structures keep 32-bit numbers short: a JSON value widens 15.3 to 15.300000190734863.
+
+#[derive(Serialize)]
+struct LinkJson {
+    frames: u64,
+    missing: u64,
+    loss_percent: Option<f32>,
+    reboots: u32,
+}
+
+#[derive(Serialize)]
+struct ComponentJson {
+    kind: &'static str,
+    number: u8,
+    name: String,
+    status: &'static str,
+    used_percent: Option<f32>,
+    /// Reached first.
+    limit: Option<String>,
+    flight_h: f64,
+    flights: f64,
+    life: bool,
 }
 
 fn state(system: u8, craft: &Craft, board: &HealthBoard, now: Instant) -> String {
@@ -143,12 +167,12 @@ fn state(system: u8, craft: &Craft, board: &HealthBoard, now: Instant) -> String
         board: &board.parts,
         usage: usage(craft),
         components: components(craft),
-        link: serde_json::json!({
-            "frames": craft.frames,
-            "missing": craft.missing,
-            "loss_percent": craft.loss.map(|loss| loss * 100.0),
-            "reboots": vehicle.reboots,
-        }),
+        link: LinkJson {
+            frames: craft.frames,
+            missing: craft.missing,
+            loss_percent: craft.loss.map(|loss| loss * 100.0),
+            reboots: vehicle.reboots,
+        },
         companion: craft.companion.json(now),
     })
 }
@@ -184,22 +208,21 @@ fn usage(craft: &Craft) -> Vec<Value> {
     SHOWN.into_iter().map(counter).collect()
 }
 
-fn components(craft: &Craft) -> Vec<Value> {
+fn components(craft: &Craft) -> Vec<ComponentJson> {
     let of_place = |place: usize| {
         let component = craft.monitor.components().get(place)?;
         let (figures, status) = craft.monitor.component_figures(place)?;
-        Some(serde_json::json!({
-            "kind": component.kind.name(),
-            "number": component.number,
-            "name": component.name.as_str(),
-            "status": status.name(),
-            "used_percent": craft.monitor.component_used_percent(place),
-            // Reached first.
-            "limit": part::of(&craft.monitor, place).and_then(|(_, limit)| limit),
-            "flight_h": figures.flight_s / 3_600.0,
-            "flights": figures.flights,
-            "life": craft.knows_life(place),
-        }))
+        Some(ComponentJson {
+            kind: component.kind.name(),
+            number: component.number,
+            name: component.name.as_str().to_owned(),
+            status: status.name(),
+            used_percent: craft.monitor.component_used_percent(place).filter(|percent| percent.is_finite()),
+            limit: part::of(&craft.monitor, place).and_then(|(_, limit)| limit),
+            flight_h: figures.flight_s / 3_600.0,
+            flights: figures.flights,
+            life: craft.knows_life(place),
+        })
     };
     (0..COMPONENTS_MAX).filter_map(of_place).collect()
 }
