@@ -42,6 +42,26 @@ pub struct SourceJson {
     pub speed: f64,
 }
 
+#[derive(Serialize)]
+struct Head<'a> {
+    t: &'static str,
+    source: &'a SourceJson,
+    now_s: f64,
+    /// Milliseconds since 1970, if known.
+    utc_ms: Option<u64>,
+    frames_s: f64,
+    vehicles: Vec<VehicleJson>,
+    influx: Option<&'a super::influx::Figures>,
+}
+
+#[derive(Serialize)]
+struct VehicleJson {
+    system: u8,
+    name: String,
+    overall: &'static str,
+    heard_ms: u64,
+}
+
 /// The head's data, apart from the world.
 #[derive(Clone, Debug)]
 pub struct HeadInputs<'a> {
@@ -59,28 +79,22 @@ pub struct HeadInputs<'a> {
 pub fn all(world: &World, now: Instant, around: &HeadInputs<'_>) -> (String, Vec<(u8, String)>) {
     let boards: Vec<_> = world.crafts.values().map(|craft| HealthBoard::of(craft, now)).collect();
     let crafts = || world.crafts.iter().zip(&boards);
-    let vehicles = crafts().map(|((system, craft), board)| {
-        serde_json::json!({
-            "system": system,
-            "name": name(craft),
-            "overall": board.overall,
-            "heard_ms": now.since(craft.heard).as_millis(),
-        })
+    let vehicles = crafts().map(|((system, craft), board)| VehicleJson {
+        system: *system,
+        name: name(craft),
+        overall: board.overall,
+        heard_ms: now.since(craft.heard).as_millis(),
     });
-    let head = serde_json::json!({
-        "t": "head",
-        "source": around.source,
-        "now_s": now.as_secs_f64(),
-        // Milliseconds since 1970, if known.
-        "utc_ms": around.epoch_us.map(|epoch| epoch.saturating_add(now.as_micros()) / 1000),
-        "frames_s": around.frames_s,
-        "vehicles": vehicles.collect::<Vec<_>>(),
-        "influx": around.influx,
+    let head = json(&Head {
+        t: "head",
+        source: around.source,
+        now_s: now.as_secs_f64(),
+        utc_ms: around.epoch_us.map(|epoch| epoch.saturating_add(now.as_micros()) / 1000),
+        frames_s: around.frames_s,
+        vehicles: vehicles.collect(),
+        influx: around.influx.as_ref(),
     });
-    (
-        json(&head),
-        crafts().map(|((system, craft), board)| (*system, state(*system, craft, board, now))).collect(),
-    )
+    (head, crafts().map(|((system, craft), board)| (*system, state(*system, craft, board, now))).collect())
 }
 
 #[derive(Serialize)]
