@@ -163,9 +163,9 @@ impl Cells {
     }
 
     fn by_settings(&self, id: u8, possible: Counts) -> (Counts, bool) {
+        let Some(settings) = self.settings.get(usize::from(id)) else { return (possible, false) };
         let (mut left, mut said) = (possible, false);
-        let settings = self.settings.get(usize::from(id)).into_iter().flatten();
-        for ((value, (from_v, to_v)), setting) in settings.zip(CELL_V).zip(0..) {
+        for ((value, (from_v, to_v)), setting) in settings.iter().zip(CELL_V).zip(0..) {
             let fitting = match setting {
                 _ if *value == 0.0 => continue,
                 0 if *value <= COUNT_MAX as f32 => 1 << *value as u32,
@@ -180,7 +180,8 @@ impl Cells {
     }
 
     fn count(&mut self, battery: usize) {
-        let Some(&Pack { highest_v, id, rested, before, doubted, .. }) = self.packs.get(battery) else {
+        let Some(Pack { highest_v, id, rested, before, doubted, .. }) = self.packs.get(battery).copied()
+        else {
             return;
         };
         let lowest_v = if rested { CELL_EMPTY_V } else { CELL_LOADED_V };
@@ -196,11 +197,13 @@ impl Cells {
         // In the air a cell may have any voltage, so only an earlier count is believed.
         let is_likely = if rested { highest_v >= f32::from(before) * CELL_CONFIRMED_V } else { !doubted };
         let confirmed = before > 0 && left >> before & 1 == 1 && is_likely;
-        self.packs[battery].count = match (is_sure, confirmed) {
-            (true, _) => left.trailing_zeros() as u8,
-            (false, true) => before,
-            (false, false) => 0,
-        };
+        if let Some(pack) = self.packs.get_mut(battery) {
+            pack.count = match (is_sure, confirmed) {
+                (true, _) => left.trailing_zeros() as u8,
+                (false, true) => before,
+                (false, false) => 0,
+            };
+        }
     }
 
     pub(crate) fn fits(&self, battery: usize, count: u8) -> bool {
