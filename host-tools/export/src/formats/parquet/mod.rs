@@ -245,8 +245,8 @@ impl Writer for Parquet {
     fn finish(mut self, context: &Context, totals: Totals) -> Result<Finished> {
         if let Some(about) = &context.about {
             let mut row = Batches::default();
-            let summary = &about.overview.ending.summary;
-            if summary.first.is_none() && about.overview.contents.frames() == 0 {
+            let (summary, contents) = (&about.overview.ending.summary, &about.overview.contents);
+            if contents.messages.is_empty() && contents.records == 0 {
                 let remarks = vec!["no entry is in it, so it is no session".to_owned()];
                 return Ok(Finished { made: Vec::new(), remarks });
             }
