@@ -69,7 +69,9 @@ pub struct Position {
     pub longitude_deg: f64,
 }
 
-/// How long a vector is.
+/// How long a vector of two or three axes is.
+#[inline]
 pub fn norm<const N: usize>(vector: [f32; N]) -> f32 {
-    libm::sqrtf(vector.iter().map(|part| part * part).sum())
+    let [x, y, z] = core::array::from_fn(|axis| vector.get(axis).copied().unwrap_or_default());
+    libm::sqrtf(x * x + y * y + z * z)
 }
