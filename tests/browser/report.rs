@@ -41,7 +41,7 @@ fn assert_sound(shown: &Value) {
     }
 }
 
-/// What a text begins with.
+/// The first words of a text.
 pub(crate) fn number(text: &str) -> f64 {
     let plain: String =
         text.chars().filter(|c| *c != '\u{202f}').map(|c| if c == '\u{2212}' { '-' } else { c }).collect();

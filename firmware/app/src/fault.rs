@@ -26,7 +26,7 @@ const SEEN: usize = 8;
 const LAST_BYTES: usize = 200;
 const MARK: u32 = 0x4641_554C;
 
-/// What a note says happened, by its number.
+/// The reason of a fault, a number in its note.
 #[derive(Clone, Copy)]
 pub(crate) enum Reason {
     LowSupply,

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use super::support::{flight, named, run, stderr, text};
 
-/// What it prints, on both streams.
+/// The text on both output streams.
 #[track_caller]
 fn hums(dir: &Path, line: &str, code: i32) -> String {
     let output = run(dir, line, code);

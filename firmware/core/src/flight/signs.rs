@@ -405,7 +405,7 @@ impl Flight {
         }
     }
 
-    /// Whether it rests after a shock as nobody lands.
+    /// Whether it rests after a shock in an attitude that no landing has.
     pub(super) fn was_thrown_down(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let is_hard = self.shock.is_some_and(|shock| shock.load_g > LEGS_G);
         is_hard && on_rotors(now, vehicle) && vehicle.inertial.lies_askew(now)

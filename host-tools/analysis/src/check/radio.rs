@@ -1,4 +1,4 @@
-//! What a pilot had been told: the texts that a box in the vehicle had sent.
+//! The texts that a box in the vehicle had sent to the pilot.
 
 use std::collections::BTreeMap;
 

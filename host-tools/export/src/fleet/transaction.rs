@@ -163,7 +163,7 @@ impl Transaction {
             .and_then(|()| tempfile::Builder::new().prefix(".").suffix(PART).tempdir_in(&own))
             .and_then(|part| fs::create_dir(part.path().join(FILES)).map(|()| part));
         let part = settle(part, root)?;
-        // It has its name once it is locked: nobody removes the folder before.
+        // The lock is held before it has its name, so no other program removes the folder.
         let new = part.path().join("new");
         let held = settle(File::create_new(&new), root)?;
         // Without locks of the file system, nobody removes its folder.

@@ -1,4 +1,4 @@
-//! A part of a log, of bounded memory: what is read and not yet taken.
+//! The bytes of a log that were read and not yet taken, in bounded memory.
 
 use std::io::{self, Read};
 

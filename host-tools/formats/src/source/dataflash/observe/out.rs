@@ -1,4 +1,4 @@
-//! The receiver of what handlers make.
+//! The receiver of the items that handlers make.
 
 use hums_core::cause::Alert;
 use hums_core::observation::{Observation, Source};
