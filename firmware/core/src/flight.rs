@@ -46,6 +46,7 @@ use crate::time::{BootMs, Millis, SILENT, Stamp};
 use crate::units::norm;
 use crate::vehicle::Vehicle;
 use disarming::DisarmWatch;
+pub(crate) use signs::overturned_deg;
 use signs::{Peak, Shock, Signs};
 use touchdown::Touchdown;
 use witness::{HEIGHT, THRUST, Votes, WORD, is_on_wings, on_rotors};

@@ -120,6 +120,11 @@ pub(super) struct Shock {
     pub(super) has_hit: bool,
 }
 
+/// Tilt of the estimator's attitude beyond which rotors are overturned, degrees.
+pub(crate) fn overturned_deg(params: &Params) -> f32 {
+    OVERTURNED_DEG.max(params.get(Param::MisOverturn))
+}
+
 impl Flight {
     /// An observation that the vehicle took.
     pub fn observe(&mut self, at: BootMs, vehicle: &Vehicle, observation: &Observation, params: &Params) {
@@ -300,7 +305,7 @@ impl Flight {
         let tilts = most > 1.5;
         let tilt_deg =
             if tilts { libm::acosf(libm::cosf(roll.0) * libm::cosf(pitch.0)).to_degrees() } else { 0.0 };
-        let over = tilt_deg > OVERTURNED_DEG.max(params.get(Param::MisOverturn))
+        let over = tilt_deg > overturned_deg(params)
             && self.arming.is_on
             && on_rotors(at, vehicle)
             && !is_made_to_turn(vehicle)

@@ -5,6 +5,7 @@
 //! freely.
 
 use super::prelude::*;
+use crate::flight::overturned_deg;
 use crate::modes::{is_banked_by_hand, is_made_to_turn};
 use crate::observation::{Attitude, VehicleKind};
 use crate::time::PAUSE;
@@ -13,8 +14,6 @@ use crate::units::Radians;
 /// 25 degrees: an attitude follows the wanted one within this, but for moments that are shorter than the debounce. The thrust loss
 /// and crash checks of `ArduCopter` take 30 degrees.
 const FOLLOWS_RAD: f32 = 0.436;
-/// 100 degrees: beyond them it is overturned, which is a mishap.
-const OVERTURNED_RAD: f32 = 1.745;
 
 const ROLL: Check = Check {
     name: "roll",
@@ -49,8 +48,10 @@ fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) ->
             || told.map_or_else(|| is_banked_by_hand(vehicle), |told| apart(is, told) < FOLLOWS_RAD);
         // No angle is too much on wings or in transition, and none counts that the sensors contradict.
         let judged = vehicle.hovers(now) == Some(true) && !asked && !vehicle.inertial.contradicts(now);
-        let judged = judged && libm::fabsf(is) < OVERTURNED_RAD;
-        if judged || !is.is_finite() { is.to_degrees().abs() } else { 0.0 }
+        let angle_deg = is.to_degrees().abs();
+        // Beyond it is overturned, which is a mishap.
+        let judged = judged && angle_deg <= overturned_deg(inputs.params);
+        if judged || !is.is_finite() { angle_deg } else { 0.0 }
     };
     Reading::new(vehicle.attitude.at(), vehicle.attitude.get().map(degrees))
 }
