@@ -505,14 +505,15 @@ fn unpacked(name: &str) -> Vec<u8> {
 const MB: usize = 1_000_000;
 
 #[test]
-fn a_log_twenty_times_as_large_takes_no_more_memory() {
+fn a_large_log_is_not_held_in_memory() {
     let mut page = Page::alone();
-    let [small, large] = [5, 100].map(|mb| large(page.dir.path(), &format!("{mb}.tlog"), mb * MB));
-    let [small, large] = [small, large].map(|log| {
+    let [small, large] = [5, 120].map(|mb| {
+        let log = large(page.dir.path(), &format!("{mb}.tlog"), mb * MB);
         page.check("#files", &[log]);
         page.shown.peak_bytes()
     });
-    assert!(large < small + 60 * MB as u64, "{small} bytes for 5 MB, {large} for 100 MB");
+    // Chromium collects what was read only after some 64 MiB of it.
+    assert!(large < small + 95 * MB as u64, "{small} bytes for 5 MB, {large} for 120 MB");
 }
 
 #[test]

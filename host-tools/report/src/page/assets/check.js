@@ -321,7 +321,8 @@ addEventListener("drop", async (event) => {
   const unread = [];
   const items = [...event.dataTransfer.items].filter(({ kind }) => kind === "file").map((item) => dropped(item, unread));
   if (items.length === 0) return;
-  if (stop.hidden) idle("Listing what was dropped.");
+  if (stop.hidden) status.textContent = "Listing what was dropped.";
+  root.dataset.state = "busy";
   const mine = ++drops;
   const found = await Promise.all(items);
   if (mine === drops) start(found, unread);
