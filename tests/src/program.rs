@@ -68,7 +68,7 @@ pub fn firmware() -> PathBuf {
 ///
 /// There is none.
 pub fn browser() -> PathBuf {
-    let built = || root().join("target/wasm32-wasip1/browser/hums-browser.wasm");
+    let built = || root().join("target/wasm32-wasip1/debug/hums-browser.wasm");
     let path = std::env::var_os("HUMS_BROWSER").map_or_else(built, PathBuf::from);
     assert!(path.is_file(), "{} is missing: `cargo xtask test --only wasm`", path.display());
     path

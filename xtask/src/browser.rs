@@ -8,30 +8,35 @@ use crate::repo::{self, BROWSER_TARGET};
 use crate::setup::{self, Need};
 use crate::shell::Shell;
 
-pub(crate) const BUILD: [&str; 6] = [
-    "build",
-    "--profile=browser",
-    "--package=hums-browser",
-    "--bin=hums-browser",
-    "--target",
-    BROWSER_TARGET,
-];
+const BUILD: [&str; 5] =
+    ["build", "--package=hums-browser", "--bin=hums-browser", "--target", BROWSER_TARGET];
 
-pub(crate) fn program(target: &Path) -> PathBuf {
+/// Of a release.
+pub(crate) const SHIPPED: [&str; 6] = [BUILD[0], BUILD[1], BUILD[2], BUILD[3], BUILD[4], "--profile=browser"];
+
+pub(crate) fn shipped(target: &Path) -> PathBuf {
     target.join(BROWSER_TARGET).join("browser/hums-browser.wasm")
 }
 
-/// Builds the program.
-pub(crate) fn build() -> Result<()> {
+/// Unoptimised like the tools: it is built in a third of the time.
+pub(crate) fn tested() -> PathBuf {
+    repo::target().join(BROWSER_TARGET).join("debug/hums-browser.wasm")
+}
+
+pub(crate) fn build_tested() -> Result<()> {
     Shell::cargo().args(BUILD).run()
+}
+
+pub(crate) fn build_shipped() -> Result<()> {
+    Shell::cargo().args(SHIPPED).run()
 }
 
 pub(crate) fn page() -> Result<()> {
     setup::require(&[Need::Linker, Need::BrowserTarget])?;
-    build()?;
+    build_shipped()?;
     let page = repo::target().join("hums-check.html");
     let maker = ["run", "--quiet", "--package=hums-browser", "--bin=hums-check-page", "--"];
-    Shell::cargo().args(maker).arg(program(&repo::target())).arg(&page).run()?;
+    Shell::cargo().args(maker).arg(shipped(&repo::target())).arg(&page).run()?;
     println!("{}", repo::shown(&page));
     Ok(())
 }

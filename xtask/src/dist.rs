@@ -161,11 +161,11 @@ impl Release {
     }
 
     fn check_page(&self) -> Result<File> {
-        let [command, arguments @ ..] = browser::BUILD;
+        let [command, arguments @ ..] = browser::SHIPPED;
         self.cargo(command, &arguments, hums_boards::DEFAULT)?;
         let page = self.target().join("hums-check.html");
         let run = ["--release", "--quiet", "--package=hums-browser", "--bin=hums-check-page", "--"];
-        let paths = [browser::program(&self.target()), page.clone()];
+        let paths = [browser::shipped(&self.target()), page.clone()];
         let paths: Vec<OsString> = paths.into_iter().map(PathBuf::into_os_string).collect();
         self.cargo("run", &[&run.map(Into::into)[..], &paths[..]].concat(), hums_boards::DEFAULT)?;
         read("hums-check.html", &page)

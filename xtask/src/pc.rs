@@ -1,6 +1,6 @@
 //! Builds for this PC: one choice for tests and campaigns. Test programs run without cargo.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use anyhow::{Context as _, Result, bail};
@@ -100,14 +100,19 @@ fn programs() -> Result<&'static [TestProgram]> {
 
 pub(crate) fn unit_tests() -> Result<()> {
     for program in programs()?.iter().filter(|one| !(one.is_integration && one.package == END_TO_END)) {
-        run(program, &[])?;
+        run(program, &browser::tested(), &[])?;
     }
     Ok(())
 }
 
 pub(crate) fn end_to_end(arguments: &[&str]) -> Result<()> {
+    end_to_end_with(&browser::tested(), arguments)
+}
+
+/// With this program of the check in a browser.
+pub(crate) fn end_to_end_with(browser: &Path, arguments: &[&str]) -> Result<()> {
     let program = programs()?.iter().find(|one| one.is_integration && one.package == END_TO_END);
-    run(program.with_context(|| format!("cargo built no tests of {END_TO_END}"))?, arguments)
+    run(program.with_context(|| format!("cargo built no tests of {END_TO_END}"))?, browser, arguments)
 }
 
 pub(crate) fn check_format() -> Result<()> {
@@ -133,14 +138,14 @@ pub(crate) fn short_campaigns() -> Result<()> {
 }
 
 /// As `cargo test` runs it.
-fn run(program: &TestProgram, options: &[&str]) -> Result<()> {
+fn run(program: &TestProgram, browser: &Path, options: &[&str]) -> Result<()> {
     println!("\n{} {}", program.package, program.name);
     Shell::new(&program.path)
         .env("HUMS_FIRMWARE", firmware::image_of(firmware::default_board()))
         .env("HUMS_DIALECT", oracle::dialect())
         .env("HUMS_PYTHON", oracle::python())
         .env("HUMS_BIN", hums::program())
-        .env("HUMS_BROWSER", browser::program(&repo::target()))
+        .env("HUMS_BROWSER", browser)
         .env("CARGO_MANIFEST_DIR", &program.folder)
         .within(&program.folder)
         .args(options)

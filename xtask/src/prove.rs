@@ -12,6 +12,7 @@ use crate::foreign;
 use crate::hums;
 use crate::oracle;
 use crate::pc;
+use crate::repo;
 use crate::setup::{self, Need};
 use crate::shell::Shell;
 
@@ -81,8 +82,8 @@ fn chip(boards: &[&'static Board], names: &[String]) -> Result<()> {
 fn in_browsers() -> Result<()> {
     setup::require(&[Need::Linker, Need::BrowserTarget, Need::PythonVenv, Need::Chromium, Need::Firefox])?;
     hums::build_release()?;
-    browser::build()?;
+    browser::build_shipped()?;
     oracle::prepare()?;
     pc::build()?;
-    pc::end_to_end(&["--ignored", "--nocapture", "browser::"])
+    pc::end_to_end_with(&browser::shipped(&repo::target()), &["--ignored", "--nocapture", "browser::"])
 }
