@@ -35,8 +35,9 @@ pub(crate) fn prepare() -> Result<()> {
     let stamp = venv().join("requirements.txt");
     if fs::read_to_string(&stamp).ok().as_deref() != Some(&wanted) {
         Shell::new("python3").args(["-m", "venv", "--clear"]).arg(venv()).run()?;
-        let pip =
-            || Shell::new(python()).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
+        // Python compiles what is imported; all of it would take longer than the rest.
+        let options = ["install", "--quiet", "--disable-pip-version-check", "--no-compile"];
+        let pip = || Shell::new(python()).args(["-m", "pip"]).args(options);
         let install = |pip: Shell, list: &PathBuf| {
             pip.arg("-r").arg(list).run().context("pymavlink cannot be installed: is there a network?")
         };
