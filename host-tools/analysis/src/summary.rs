@@ -19,7 +19,7 @@ use crate::ending::Ending;
 use crate::followed::HasEnding;
 use crate::logs::board::Board;
 use crate::logs::{Log, marks};
-use crate::mavlink::frame::{Check, Peek, peek};
+use crate::mavlink::frame::is_bad;
 use crate::names::counter_name;
 use crate::part;
 use crate::plural::are;
@@ -471,8 +471,7 @@ impl ItemCollector for Contents {
         match item {
             Item::Record(record) => self.record(at, record),
             Item::Frame(frame) if frame.check() == link::Check::Verified => {
-                let is_bad = matches!(peek(frame.bytes()), Peek::Frame(frame) if frame.check() == Check::Bad);
-                self.bad_frames += u64::from(is_bad);
+                self.bad_frames += u64::from(is_bad(frame));
             }
             _ => {}
         }

@@ -2,7 +2,7 @@
 
 use hums_blackbox::{Gap, Record};
 use hums_core::clock::Instant;
-use hums_link as link;
+use hums_link::Frame;
 
 use super::checked::FindingCount;
 use super::context::Context;
@@ -10,7 +10,6 @@ use super::format::{Entry, GroupEncoder};
 use super::record::{gap_row, rows};
 use super::row::Row;
 use super::story::{HeldObservation, Story, StoryEntry};
-use crate::mavlink::frame::{Peek, peek};
 use crate::mavlink::values::Payload;
 use crate::source::item::Item;
 use crate::source::parts::ItemCollector;
@@ -47,17 +46,13 @@ impl<'a> CollectedGroup<'a> {
         }
     }
 
-    fn frame(&mut self, at: Instant, frame: &link::Frame<'_>) {
-        let (bytes, verified) = (frame.bytes(), frame.check() == link::Check::Verified);
-        let Peek::Frame(frame) = peek(bytes) else { return };
-        if !self.context.selection.has_id(frame.id) {
+    fn frame(&mut self, at: Instant, frame: &Frame<'_>) {
+        if !self.context.selection.has_id(frame.id()) {
             return;
         }
         self.frames += 1;
-        let known =
-            if verified { frame.message().map(|message| Payload::new(message, frame.payload)) } else { None };
-        let utc_us = self.context.epochs.utc_us(at);
-        let entry = Entry { at, utc_us, frame: &frame, known: known.as_ref() };
+        let (known, utc_us) = (Payload::of(frame), self.context.epochs.utc_us(at));
+        let entry = Entry { at, utc_us, frame, known: known.as_ref() };
         self.parts.iter_mut().for_each(|part| part.frame(self.context, &entry));
     }
 

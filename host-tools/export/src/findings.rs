@@ -65,7 +65,7 @@ impl Texts {
         while let Some((time, frame)) = records.split_first_chunk::<TIME_BYTES>() {
             self.push_until(u64::from_be_bytes(*time), &mut merged);
             let Peek::Frame(frame) = peek(frame) else { break };
-            let (record, rest) = records.split_at(TIME_BYTES + frame.bytes.len());
+            let (record, rest) = records.split_at(TIME_BYTES + frame.bytes().len());
             merged.extend_from_slice(record);
             records = rest;
         }

@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::Gap;
 use hums_core::clock::Instant;
+use hums_link::Frame;
 
 use crate::DecodeRequest;
 use crate::context::Context;
 use crate::files::{Output, make_parent, settle};
 use crate::made::OutputFile;
-use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
 use crate::outcome::Outcome;
 use crate::row::Row;

@@ -1,6 +1,7 @@
 //! The tables that a log becomes.
 
-use crate::mavlink::frame::Frame;
+use hums_link::Frame;
+
 use crate::names::message_name;
 
 /// A table of a log.
@@ -21,10 +22,10 @@ pub enum Table {
 impl Table {
     /// The table of a frame; `known` says that its definition is ours.
     pub fn of(frame: &Frame<'_>, known: bool) -> Self {
-        match (known, frame.message()) {
-            (true, _) => Self::Message(frame.id),
-            (false, Some(_)) => Self::Unverified(frame.id),
-            (false, None) => Self::Unknown(frame.id),
+        match (known, hums_dialect::message(frame.id())) {
+            (true, _) => Self::Message(frame.id()),
+            (false, Some(_)) => Self::Unverified(frame.id()),
+            (false, None) => Self::Unknown(frame.id()),
         }
     }
 

@@ -11,6 +11,7 @@ use hums_core::clock::Instant;
 use hums_core::health::Level;
 use hums_core::observation::Observation;
 use hums_dialect::{Field, Kind};
+use hums_link::Frame;
 
 use crate::context::Context;
 use crate::field_names::free_name;
@@ -19,7 +20,6 @@ use crate::format::{
 };
 use crate::hex::hex;
 use crate::made::OutputFile;
-use crate::mavlink::frame::Frame;
 use crate::mavlink::ids::ACTUATOR_OUTPUT_STATUS;
 use crate::mavlink::values::{FieldValue, Payload, Scalar};
 use crate::reference::{Quantity, Reference};
@@ -98,21 +98,21 @@ impl Lines {
         let name = Table::of(frame, known.is_some()).name();
         self.text.extend_from_slice(name.as_bytes());
         self.text.extend_from_slice(b",component=");
-        push_integer(&mut self.text, u64::from(frame.component));
+        push_integer(&mut self.text, u64::from(frame.component()));
         tags.push_session(&mut self.text);
         self.text.extend_from_slice(b",system=");
-        push_integer(&mut self.text, u64::from(frame.system));
+        push_integer(&mut self.text, u64::from(frame.system()));
         tags.push_vehicle(&mut self.text);
         let mut fields = Fields::of(&mut self.text);
         if let Some(payload) = known {
             payload.fields().for_each(|(field, value)| fields.value(field, value));
         } else {
-            fields.name("sequence").integer(i64::from(frame.sequence));
-            fields.text("payload", &hex(frame.payload));
+            fields.name("sequence").integer(i64::from(frame.sequence()));
+            fields.text("payload", &hex(frame.payload()));
         }
         let count = fields.count;
         self.end(start, at, count);
-        if let Some(payload) = known.filter(|_| frame.id == ACTUATOR_OUTPUT_STATUS) {
+        if let Some(payload) = known.filter(|_| frame.id() == ACTUATOR_OUTPUT_STATUS) {
             self.actuators(tags, at, payload);
         }
     }

@@ -31,20 +31,22 @@ impl GroupEncoder for Lines {
         let Entry { frame, known, .. } = entry;
         let out = &mut self.0;
         push_times(out, entry.at, entry.utc_us);
-        for (name, number) in [(&b",\"system\":"[..], frame.system), (b",\"component\":", frame.component)] {
+        for (name, number) in
+            [(&b",\"system\":"[..], frame.system()), (b",\"component\":", frame.component())]
+        {
             out.extend_from_slice(name);
             push_integer(out, u64::from(number));
         }
         out.extend_from_slice(b",\"id\":");
-        push_integer(out, u64::from(frame.id));
+        push_integer(out, u64::from(frame.id()));
         out.extend_from_slice(b",\"message\":");
-        push_json_text(out, message_name(frame.id).as_bytes());
+        push_json_text(out, message_name(frame.id()).as_bytes());
         if let Some(payload) = known {
             out.extend_from_slice(b",\"fields\":");
             push_json_object(out, payload);
         } else {
             out.extend_from_slice(b",\"verified\":false,\"payload\":\"");
-            push_hex(out, frame.payload);
+            push_hex(out, frame.payload());
             out.push(b'"');
         }
         out.extend_from_slice(b"}\n");

@@ -32,7 +32,7 @@ impl GroupEncoder for Records {
     fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
         let utc = entry.utc_us.unwrap_or_else(|| entry.at.as_micros());
         self.0.extend_from_slice(&utc.to_be_bytes());
-        self.0.extend_from_slice(entry.frame.bytes);
+        self.0.extend_from_slice(entry.frame.bytes());
     }
 
     fn held_bytes(&self) -> usize {

@@ -87,7 +87,7 @@ pub(crate) struct Words {
 
 impl GroupEncoder for Words {
     fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
-        let Some(payload) = entry.known.filter(|_| entry.frame.id == RC_CHANNELS) else { return };
+        let Some(payload) = entry.known.filter(|_| entry.frame.id() == RC_CHANNELS) else { return };
         let number = |name: &str| payload.number(name).unwrap_or(0.0);
         let channel = |(field, value): (&hums_dialect::Field, FieldValue<'_>)| match value {
             FieldValue::Scalar(Scalar::Unsigned(value))

@@ -75,6 +75,12 @@ pub struct Payload {
 }
 
 impl Payload {
+    /// Of a verified frame.
+    pub fn of(frame: &hums_link::Frame<'_>) -> Option<Self> {
+        let message = hums_dialect::messages().get(usize::from(frame.message()?))?;
+        Some(Self::new(message, frame.payload()))
+    }
+
     /// The checksum must match `message`.
     pub fn new(message: &'static Message, payload: &[u8]) -> Self {
         let mut bytes = [0; 256];

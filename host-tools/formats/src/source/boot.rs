@@ -8,7 +8,7 @@ use std::io::Read;
 
 use super::item::AUTOPILOT;
 use super::tlog::records::Records;
-use crate::mavlink::frame;
+use crate::mavlink::frame::{Peek, peek};
 
 /// Microseconds: beyond this another recording is possible.
 pub(super) const JOINT_US: u64 = 3_600_000_000;
@@ -21,18 +21,13 @@ const HELD_BACK_US: u64 = 10_000_000;
 
 /// `SYSTEM_TIME`, `ATTITUDE`, `GLOBAL_POSITION_INT`; a payload's trailing zeros are not sent.
 pub(super) fn boot_ms(frame: &hums_link::Frame<'_>) -> Option<u32> {
-    boot_ms_of(frame.id(), frame.component(), frame.payload())
-}
-
-/// [`boot_ms`] of a frame by its parts.
-pub(super) fn boot_ms_of(id: u32, component: u8, payload: &[u8]) -> Option<u32> {
-    let offset = match id {
+    let offset = match frame.id() {
         2 => 8,
         30 | 33 => 0,
         _ => return None,
     };
-    let byte = |at: usize| payload.get(offset + at).copied().unwrap_or(0);
-    (component == AUTOPILOT).then(|| u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)]))
+    let byte = |at: usize| frame.payload().get(offset + at).copied().unwrap_or(0);
+    (frame.component() == AUTOPILOT).then(|| u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)]))
 }
 
 /// Last report: system, and ms since power-on.
@@ -48,10 +43,8 @@ impl Joints {
     /// ms from the last report before a jump to the jump, by the first report after it.
     fn passed_ms<R: Read>(self, time_us: u64, after: &Records<R>) -> Option<i64> {
         let (system, before_ms) = self.0?;
-        let (after_us, after_ms) = after.frames_after(|recorded_us, bytes| match frame::peek(bytes) {
-            frame::Peek::Frame(frame) if frame.system == system => {
-                Some((recorded_us, boot_ms_of(frame.id, frame.component, frame.payload)?))
-            }
+        let (after_us, after_ms) = after.frames_after(|recorded_us, bytes| match peek(bytes) {
+            Peek::Frame(frame) if frame.system() == system => Some((recorded_us, boot_ms(&frame)?)),
             _ => None,
         })?;
         let since_jump_ms = i64::try_from(after_us.saturating_sub(time_us) / 1_000).ok()?;

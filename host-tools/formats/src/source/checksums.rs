@@ -34,7 +34,8 @@ impl Checksums {
     /// Notes the begin of a record.
     pub fn begin(&mut self, at: Instant, place: u64, bytes: &[u8]) {
         let Peek::Frame(frame) = peek(bytes) else { return };
-        (self.waits, self.length) = (Some(frame.message().is_some()), frame.bytes.len());
+        let is_known = hums_dialect::message(frame.id()).is_some();
+        (self.waits, self.length) = (Some(is_known), frame.bytes().len());
         (self.at, self.place) = (at, place);
     }
 

@@ -7,7 +7,7 @@ use std::io::{self, Cursor, Read};
 
 use super::stream::read_some;
 use crate::mavlink::frame::FRAME_BYTES_MAX;
-use crate::mavlink::frame::{Check, Peek, peek};
+use crate::mavlink::frame::{Peek, is_good, peek};
 
 /// A few hundred frames.
 const WINDOW_BYTES: usize = 64 * 1024;
@@ -76,9 +76,9 @@ fn count(bytes: &[u8]) -> (i32, usize) {
     let mut at = 0;
     while let Some(rest) = bytes.get(at..).filter(|rest| !rest.is_empty()) {
         match peek(rest) {
-            Peek::Frame(frame) if frame.check() == Check::Good => {
+            Peek::Frame(frame) if is_good(&frame) => {
                 good += 1;
-                let next = at + frame.bytes.len();
+                let next = at + frame.bytes().len();
                 let begins =
                     |at: usize| bytes.get(at..).is_some_and(|rest| matches!(peek(rest), Peek::Frame(_)));
                 match (begins(next), begins(next + 8)) {

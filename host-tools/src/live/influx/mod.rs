@@ -28,7 +28,6 @@ use super::world::World;
 use crate::decode::formats::influx::{Clock, Lines};
 use crate::decode::record::rows;
 use crate::interrupt;
-use crate::mavlink::frame::{Peek, peek};
 use crate::mavlink::values::Payload;
 use crate::source::epochs::Epochs;
 
@@ -83,14 +82,9 @@ impl Influx {
     /// The world took the frame before.
     pub fn frame(&mut self, at: Instant, epoch_us: u64, frame: &Frame<'_>, world: &World) {
         let tags = self.names.tags(frame.system(), world);
-        if let Peek::Frame(raw) = peek(frame.bytes()) {
-            let verified = frame.check() == hums_link::Check::Verified;
-            let message = raw.message().filter(|_| verified);
-            let payload = message.map(|message| Payload::new(message, raw.payload));
-            let mut lines = Lines::default();
-            lines.frame(&tags, at, &raw, payload.as_ref());
-            self.put(&lines, epoch_us, false);
-        }
+        let mut lines = Lines::default();
+        lines.frame(&tags, at, frame, Payload::of(frame).as_ref());
+        self.put(&lines, epoch_us, false);
         let Some((source, observation)) = observe(frame) else { return };
         let Some(craft) = world.crafts.get(&source.system) else { return };
         if craft.monitor.vehicle().source == Some(source) || craft.told_by_part(source, &observation) {

@@ -55,9 +55,9 @@ impl GroupEncoder for Lines {
         };
         self.line(table, |out| {
             push_times(out, entry.at, entry.utc_us);
-            let id = (table == Table::Unknowns).then_some(frame.id);
-            let sequence = known.is_none().then(|| frame.sequence.into());
-            let numbers = [Some(frame.system.into()), Some(frame.component.into()), id, sequence];
+            let id = (table == Table::Unknowns).then_some(frame.id());
+            let sequence = known.is_none().then(|| frame.sequence().into());
+            let numbers = [Some(frame.system().into()), Some(frame.component().into()), id, sequence];
             for number in numbers.into_iter().flatten() {
                 out.push(b',');
                 push_integer(out, u64::from(number));
@@ -66,7 +66,7 @@ impl GroupEncoder for Lines {
                 push_csv_cells(out, payload);
             } else {
                 out.push(b',');
-                push_hex(out, frame.payload);
+                push_hex(out, frame.payload());
             }
         });
     }

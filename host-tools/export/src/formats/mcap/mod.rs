@@ -78,12 +78,12 @@ impl GroupEncoder for Messages {
         let Some(payload) = entry.known else {
             return self.add(Topic::Opaque, time_ns, |out| {
                 let numbers =
-                    [frame.system.into(), frame.component.into(), u64::from(frame.id), frame.sequence.into()];
+                    [frame.system().into(), frame.component().into(), frame.id().into(), frame.sequence().into()];
                 (1..).zip(numbers).for_each(|(number, value)| unsigned(out, number, value));
-                bytes(out, 5, frame.payload);
+                bytes(out, 5, frame.payload());
             });
         };
-        self.add(Topic::Mavlink(frame.system, frame.component, frame.id), time_ns, |out| {
+        self.add(Topic::Mavlink(frame.system(), frame.component(), frame.id()), time_ns, |out| {
             for (number, (_, value)) in (1..).zip(payload.fields()) {
                 match value {
                     FieldValue::Scalar(value) => scalar(out, number, value),

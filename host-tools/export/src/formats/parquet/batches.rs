@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use hums_core::clock::Instant;
+use hums_link::Frame;
 
 use super::columns::TableRows;
-use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
 use crate::row::{Cell, Row};
 use crate::table::Table;
@@ -50,8 +50,9 @@ impl Batches {
             TableRows::of_frames(table)
         });
         // A payload is sent without the zeros at its end; opaque ones are digits.
-        let sent =
-            known.and(frame.message()).map_or(2 * frame.payload.len(), |message| message.len_max.into());
+        let sent = known
+            .and(hums_dialect::message(frame.id()))
+            .map_or(2 * frame.payload().len(), |message| message.len_max.into());
         self.held_bytes += ROW_BYTES + FIELD_BYTES * columns.columns().len() + sent;
         columns.frame(at, utc_us, frame, known);
     }

@@ -4,6 +4,7 @@
 
 use hums_core::clock::Instant;
 use hums_dialect::Kind as Sent;
+use hums_link::Frame;
 use parquet::basic::{LogicalType, Repetition, TimeUnit, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::errors::Result;
@@ -12,7 +13,6 @@ use parquet::schema::types::Type;
 
 use crate::field_names::free_name;
 use crate::hex::hex;
-use crate::mavlink::frame::Frame;
 use crate::mavlink::values::{FieldValue, Payload, Scalar};
 use crate::row::{Cell, CellType, Row, plain_name};
 use crate::table::Table;
@@ -431,15 +431,15 @@ impl TableRows {
         let mut columns = self.begin(at, utc_us);
         let mut push = |value| columns.next().into_iter().for_each(|column| column.push_value(value));
         let number = |number: u32| FieldValue::Scalar(Scalar::Unsigned(number.into()));
-        push(number(frame.system.into()));
-        push(number(frame.component.into()));
+        push(number(frame.system().into()));
+        push(number(frame.component().into()));
         if let Some(payload) = known {
             payload.fields().for_each(|(_, value)| push(value));
             return;
         }
-        push(number(frame.id));
-        push(number(frame.sequence.into()));
-        push(FieldValue::Text(hex(frame.payload).as_bytes()));
+        push(number(frame.id()));
+        push(number(frame.sequence().into()));
+        push(FieldValue::Text(hex(frame.payload()).as_bytes()));
     }
 
     pub(super) fn row(&mut self, at: Instant, utc_us: Option<u64>, row: &Row) {
@@ -486,16 +486,10 @@ mod tests {
 
     #[test]
     fn every_message_fills_its_columns_which_have_different_names() {
+        let frame =
+            Frame::again(&[0xfe, 0, 0, 1, 1, 0, 0, 0], hums_link::Check::Unverified).expect("a frame");
         for message in hums_dialect::messages() {
-            let frame = Frame {
-                bytes: &[],
-                id: message.id,
-                sequence: 0,
-                system: 1,
-                component: 1,
-                payload: &[0x5a; 255],
-            };
-            let payload = Payload::new(message, frame.payload);
+            let payload = Payload::new(message, &[0x5a; 255]);
             let mut columns = TableRows::of_frames(Table::Message(message.id));
             columns.frame(Instant::from_millis(5), Some(7), &frame, Some(&payload));
             columns.frame(Instant::from_millis(6), None, &frame, Some(&payload));

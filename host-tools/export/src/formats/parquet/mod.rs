@@ -402,6 +402,7 @@ impl TableFile {
 
 #[cfg(test)]
 mod tests {
+    use hums_link::{Check, Frame};
     use parquet::file::metadata::RowGroupMetaData;
     use parquet::file::reader::{FileReader as _, SerializedFileReader};
     use parquet::record::RowAccessor as _;
@@ -409,12 +410,7 @@ mod tests {
     use super::*;
     use crate::files::Inputs;
     use crate::fleet::Fleet;
-    use crate::mavlink::frame::Frame;
     use crate::mavlink::values::Payload;
-
-    fn frame(id: u32) -> Frame<'static> {
-        Frame { bytes: &[], id, sequence: 0, system: 1, component: 1, payload: &[0x5a; 255] }
-    }
 
     #[test]
     fn a_session_of_many_row_groups_goes_on_in_further_files_and_no_row_is_lost() {
@@ -435,9 +431,11 @@ mod tests {
             tables.limits = limits;
             for second in 0..2000_u32 {
                 let mut batches = Batches::default();
-                for id in [0, 30] {
-                    let frame = frame(id);
-                    let payload = frame.message().map(|message| Payload::new(message, frame.payload));
+                for id in [0_u8, 30] {
+                    let bytes = [0xfe, 0, 0, 1, 1, id, 0, 0];
+                    let frame = Frame::again(&bytes, Check::Unverified).expect("a frame");
+                    let message = hums_dialect::message(id.into());
+                    let payload = message.map(|message| Payload::new(message, &[0x5a; 255]));
                     batches.frame(
                         Instant::from_millis(u64::from(second) * 1000),
                         None,

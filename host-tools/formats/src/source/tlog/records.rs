@@ -4,7 +4,7 @@
 
 use std::io::{self, Read};
 
-use crate::mavlink::frame::{Check, FRAME_BYTES_MAX, Peek, peek};
+use crate::mavlink::frame::{FRAME_BYTES_MAX, Peek, is_good, peek};
 use crate::source::buffer::Buffer;
 use crate::source::doubt::ASKED;
 
@@ -134,13 +134,13 @@ fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
         return None;
     }
     let Peek::Frame(frame) = peek(bytes.get(TIME_BYTES..)?) else { return None };
-    let length = frame.bytes.len();
+    let length = frame.bytes().len();
     let after = bytes.get(TIME_BYTES + length..).unwrap_or_default();
     let followed = match after.get(TIME_BYTES..) {
         None => ended && after.is_empty(),
         Some(next) => after.first() == Some(&0) && matches!(peek(next), Peek::Frame(_) | Peek::Short),
     };
-    let counts = frame.check() == Check::Good || followed && !has_record_in(frame.bytes);
+    let counts = is_good(&frame) || followed && !has_record_in(frame.bytes());
     counts.then_some((time_us, length))
 }
 
@@ -148,8 +148,8 @@ fn has_record_in(frame: &[u8]) -> bool {
     (1..frame.len()).any(|at| {
         let record = frame.get(at..).unwrap_or_default();
         record.first() == Some(&0)
-            && record.get(TIME_BYTES..).is_some_and(
-                |inner| matches!(peek(inner), Peek::Frame(inner) if inner.check() == Check::Good),
-            )
+            && record
+                .get(TIME_BYTES..)
+                .is_some_and(|inner| matches!(peek(inner), Peek::Frame(inner) if is_good(&inner)))
     })
 }

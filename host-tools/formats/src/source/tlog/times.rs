@@ -5,9 +5,9 @@ use std::io::Read;
 use hums_core::clock::Instant;
 
 use super::records::{Records, UTC_US_MIN};
-use crate::mavlink::frame::{Check, Peek, peek};
+use crate::mavlink::frame::{Peek, is_good, peek};
 use crate::plural::count;
-use crate::source::boot::{JOINT_US, Joints, boot_ms_of};
+use crate::source::boot::{JOINT_US, Joints, boot_ms};
 use crate::source::clock::{Clock, LaterTimes, Reading, Rules, Stamp, WrongTimes};
 use crate::source::doubt::Ends;
 use crate::source::item::{Cause, Gap};
@@ -152,11 +152,11 @@ impl Times {
     ) -> JudgedTime {
         let told = self.time(time_us, place, after);
         if let Peek::Frame(frame) = peek(bytes)
-            && let Some(boot_ms) = boot_ms_of(frame.id, frame.component, frame.payload)
-            && frame.check() == Check::Good
+            && let Some(boot_ms) = boot_ms(&frame)
+            && is_good(&frame)
         {
-            self.joints.told(frame.system, boot_ms);
-            let early_us = self.beside.told(frame.system, boot_ms, self.now, place);
+            self.joints.told(frame.system(), boot_ms);
+            let early_us = self.beside.told(frame.system(), boot_ms, self.now, place);
             if early_us > 0 {
                 self.clock.pass(early_us);
                 self.now = self.clock.now();
