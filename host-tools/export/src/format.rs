@@ -11,7 +11,7 @@ use hums_blackbox::Gap;
 use hums_core::clock::Instant;
 use hums_link::Frame;
 
-use crate::DecodeRequest;
+use crate::args::Decode;
 use crate::context::Context;
 use crate::files::{Output, make_parent, settle};
 use crate::made::OutputFile;
@@ -230,7 +230,7 @@ pub enum Way {
         open: fn(&Context, &Path) -> Result<Box<dyn AnyWriter>>,
     },
     /// Written alone, from all bytes of one recording.
-    Alone(fn(&DecodeRequest) -> Result<Outcome>),
+    Alone(fn(&Decode) -> Result<Outcome>),
 }
 
 impl Format {

@@ -23,6 +23,7 @@ use hums_analysis::{check, manifest, reference, states, summary};
 use hums_base::{endpoint, files, hex, outcome, output, plural, printable, utc};
 use hums_formats::{ending, followed, logs, loss, mavlink, names, naming, source};
 
+pub mod args;
 pub mod checked;
 pub mod collect;
 pub mod context;
@@ -57,6 +58,7 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use hums_core::clock::Instant;
 
+use args::Decode;
 use check::judge::{Judge, Limits};
 use checked::Checked;
 use collect::CollectedGroup;
@@ -90,73 +92,32 @@ use source::recording::{Format, LogPlace};
 use storage::{Address, Upload};
 use story::StoryEntry;
 use summary::damaged_places;
-use utc::TimePoint;
 use works::{NamedLog, check_forms, without_frames, works};
 use write::Writers;
 
 /// Output of `hums decode --json`.
 pub const SCHEMA: Schema = Schema::first("hums-decode");
 
-/// The request of `hums decode`.
-#[derive(Clone, Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
-pub struct DecodeRequest {
-    /// Logs, images, recordings, and folders of them.
-    pub inputs: Vec<PathBuf>,
-    /// Look at every block of an image.
-    pub salvage: bool,
-    /// Only this session.
-    pub session: Option<String>,
-    /// The file or folder to write.
-    pub output: PathBuf,
-    /// The formats to write.
-    pub formats: Vec<&'static format::Format>,
-    /// Entries before it are left out.
-    pub from: Option<TimePoint>,
-    /// Entries after it are left out.
-    pub to: Option<TimePoint>,
-    /// Each flight has files of its own.
-    pub split: bool,
-    /// Seconds from the log's beginning to the video's, for subtitles.
-    pub offset_s: f64,
-    /// A tlog has the findings as texts.
-    pub findings: bool,
-    /// The file for a manifest of the files read and made.
-    pub manifest: Option<PathBuf>,
-    /// The name and version of this program, for the manifest.
-    pub program: &'static str,
-    /// The vehicle of all logs without a unique id.
-    pub vehicle: Option<String>,
-    /// Only messages of these names.
-    pub messages: Vec<String>,
-    /// Replace existing outputs.
-    pub force: bool,
-    /// Print the result as JSON.
-    pub json: bool,
-}
-
-/// Runs `hums decode`.
-pub fn run(args: &DecodeRequest) -> Result<Outcome> {
+/// Runs `hums decode`. `program`: name and version of this program, for the manifest.
+pub fn run(args: &Decode, program: &'static str) -> Result<Outcome> {
     check_request(args)?;
-    let Some(address) = Address::of(&args.output)? else { return decode(args, None) };
+    let Some(address) = Address::of(&args.output)? else { return decode(args, program, None) };
     if args.manifest.is_some() {
         return Err(usage_error("--manifest: lists files on this computer, and -o names object storage"));
     }
     let upload = Upload::new(&address, &args.output, args.force)?;
-    let outcome = decode(
-        &DecodeRequest { output: upload.path().to_owned(), ..args.clone() },
-        Some(Bucket::open(&address)?),
-    )?;
+    let local = Decode { output: upload.path().to_owned(), ..args.clone() };
+    let outcome = decode(&local, program, Some(Bucket::open(&address)?))?;
     upload.send(args.force)?;
     Ok(outcome)
 }
 
-fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
+fn decode(args: &Decode, program: &'static str, bucket: Option<Bucket>) -> Result<Outcome> {
     let alone = |format: &&format::Format| if let Way::Alone(run) = format.way { Some(run) } else { None };
-    if let Some(run) = args.formats.iter().find_map(alone) {
+    if let Some(run) = args.format.iter().find_map(alone) {
         return run(args);
     }
-    let formats = Formats::new(&args.formats, args.split);
+    let formats = Formats::new(&args.format, args.split.is_some());
     let (given, remarks) = naming::without_made(&args.inputs);
     let found = find(&given, args.salvage)?;
     remark(&found, &remarks);
@@ -181,7 +142,7 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
         standard_output,
         logs,
         has_findings: args.findings,
-        offset_s: args.offset_s,
+        offset_s: args.offset,
         vehicle: args.vehicle.as_deref(),
         fleet: Arc::new(Fleet::new(&args.output, bucket)),
     };
@@ -215,7 +176,7 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
         // A longer log of the same session may have replaced the tables of a shorter one.
         made.retain(|path| path.exists());
         let roots: Vec<PathBuf> = given.iter().chain([&args.output]).cloned().collect();
-        manifest.write(args.program, to, &roots, &read, &made, &task.inputs)?;
+        manifest.write(program, to, &roots, &read, &made, &task.inputs)?;
     }
     if !written {
         bail!(
@@ -236,15 +197,15 @@ fn tell_existing(existing: &[String]) {
     }
 }
 
-fn check_request(args: &DecodeRequest) -> Result<()> {
-    if args.findings && !args.formats.iter().any(|format| format.about.name == "tlog") {
+fn check_request(args: &Decode) -> Result<()> {
+    if args.findings && !args.format.iter().any(|format| format.about.name == "tlog") {
         return Err(usage_error("--findings is for --format tlog; the tables have the findings anyway"));
     }
-    if args.manifest.is_some() && args.formats.iter().any(|format| matches!(format.way, Way::Alone(_))) {
+    if args.manifest.is_some() && args.format.iter().any(|format| matches!(format.way, Way::Alone(_))) {
         return Err(usage_error("--manifest: a log of one recording has none; hums info --verify makes it"));
     }
     let is_of_fleet = |format: &&format::Format| matches!(format.about.files, Files::Fleet(_));
-    if args.split && args.formats.iter().any(is_of_fleet) {
+    if args.split.is_some() && args.format.iter().any(is_of_fleet) {
         return Err(usage_error(
             "--split flights: the tables of a fleet hold whole sessions; leave out parquet",
         ));
@@ -273,7 +234,7 @@ fn beside(work: &NamedLog<'_>) -> Result<Done> {
 
 /// Whether the output is standard output. An error if the requested formats cannot go there, or into the
 /// given file.
-fn check_output(args: &DecodeRequest, logs: usize, formats: &Formats) -> Result<bool> {
+fn check_output(args: &Decode, logs: usize, formats: &Formats) -> Result<bool> {
     let standard_output = means_standard_output(&args.output);
     if standard_output && (logs != 1 || !formats.is_single_file()) {
         let why = match logs {

@@ -6,7 +6,7 @@ use anyhow::Result;
 use hums_blackbox::Gap;
 use hums_core::clock::Instant;
 
-use crate::DecodeRequest;
+use crate::args::Decode;
 use crate::outcome::usage;
 use crate::source::epochs::Epochs;
 use crate::utc::TimePoint;
@@ -23,8 +23,8 @@ pub struct Selection {
 
 impl Selection {
     /// As the command line says it; `native` says that there are messages other than MAVLink's, with names of their own.
-    pub fn new(args: &DecodeRequest, native: bool) -> Result<Self> {
-        let ids = args.messages.iter().map(|name| id_of(name));
+    pub fn new(args: &Decode, native: bool) -> Result<Self> {
+        let ids = args.message.iter().map(|name| id_of(name));
         // A name other than an id selects a number that does not occur, because an empty list would select
         // all.
         let other = |id: Result<u32>| id.or_else(|error| if native { Ok(u32::MAX) } else { Err(error) });
@@ -37,7 +37,7 @@ impl Selection {
         if is_backwards {
             return Err(usage("--from is later than --to: nothing lies between them"));
         }
-        Ok(Self { from: args.from, to: args.to, ids, names: args.messages.clone() })
+        Ok(Self { from: args.from, to: args.to, ids, names: args.message.clone() })
     }
 
     /// The selection within this time.

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::read::input;
 use crate::check;
+use crate::decode::args::input;
 
 const EXAMPLES: &str = "Examples:
   hums flight.tlog

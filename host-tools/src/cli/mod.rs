@@ -9,9 +9,10 @@ mod talk;
 
 use clap::{Parser, Subcommand};
 
+pub use crate::decode::args::{Compact, Decode, Logbook, Share};
 pub use check::Check;
 pub use live::Live;
-pub use read::{Compact, Decode, Due, Info, Logbook, Report, Share, Split};
+pub use read::{Due, Info, Report};
 pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
 pub use talk::{

@@ -23,6 +23,7 @@ use sha2::{Digest as _, Sha256};
 use super::bucket::Bucket;
 use super::transaction::{self, OWN, Transaction};
 use super::{EXTENSION, SESSIONS, folders, names, session_of};
+use crate::args::Compact;
 use crate::hex::hex;
 use crate::logs::in_order::{in_order, workers};
 use crate::outcome::{Outcome, usage};
@@ -38,13 +39,6 @@ const LARGE_BYTES: u64 = 256 << 20;
 /// Values of a column of a row group at most: a column is in memory as a whole. A row of a column of lists has many values.
 const GROUP_VALUES: usize = 256 * 1024;
 const AT_ONCE: usize = 4;
-
-/// The request of `hums compact`.
-#[derive(Clone, Debug)]
-pub struct CompactRequest {
-    /// The folder of the tables.
-    pub folder: PathBuf,
-}
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sum {
@@ -75,7 +69,7 @@ pub(super) fn is_compacted(name: &str, bytes: u64) -> bool {
 }
 
 /// Runs `hums compact`.
-pub fn run(args: &CompactRequest) -> Result<Outcome> {
+pub fn run(args: &Compact) -> Result<Outcome> {
     let mut failures = 0;
     let mut failed = |partition: &str, error: &anyhow::Error| {
         failures += 1;

@@ -14,6 +14,7 @@ use parquet::schema::types::Type;
 
 use super::transaction::stop;
 use super::*;
+use crate::args::Compact;
 use crate::identity::Identity;
 
 const VEHICLES: [u64; 5] = [0, 2, 10, 1, 3];
@@ -129,17 +130,17 @@ fn a_compaction_that_is_stopped_at_any_step_loses_and_doubles_no_row() {
         fs::write(root.join("A/date=2026-05-01/mine.txt"), "mine").expect("written");
         let before = all_rows(root);
         stop::after(Some(steps));
-        let ended = compact::run(&compact::CompactRequest { folder: root.to_owned() });
+        let ended = compact::run(&Compact { folder: root.to_owned() });
         come_next(root);
         assert_eq!(all_rows(root), before, "after {steps} steps");
         add(root, 3, Some("2026-05-01"), 9, false).expect_err("it is there");
         add(root, 3, None, 9, false).expect_err("it is there, with another date");
-        compact::run(&compact::CompactRequest { folder: root.to_owned() }).expect("compacted");
+        compact::run(&Compact { folder: root.to_owned() }).expect("compacted");
         assert_eq!(all_rows(root), before, "after {steps} steps, and again");
         add(root, 3, Some("2026-05-01"), 9, true).expect_err("it shares a file");
         // New sessions join those of an earlier compaction.
         assert!(add(root, 15, Some("2026-05-01"), 5, false).expect("added"));
-        compact::run(&compact::CompactRequest { folder: root.to_owned() }).expect("compacted");
+        compact::run(&Compact { folder: root.to_owned() }).expect("compacted");
         let all = rows(root, "A");
         assert_eq!(all.len(), before[0].len() + 5);
         let count = |table: &str| -> usize {

@@ -12,6 +12,8 @@ use hums_core::clock::Instant;
 use hums_link::{Check, Framer};
 use sha2::{Digest as _, Sha256};
 
+use crate::SCHEMA;
+use crate::args::Decode;
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output, cannot_write, says_directory};
 use crate::format::{Files, Format, FormatDetails, Way};
@@ -25,7 +27,6 @@ use crate::source::booted::BootTimedSource;
 use crate::source::checksums::Checksums;
 use crate::source::own::JOINED;
 use crate::source::{self, Source, Timing};
-use crate::{DecodeRequest, SCHEMA};
 use hums_analysis::soundness::Soundness;
 
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
@@ -44,7 +45,7 @@ pub(super) const FORMAT: Format = Format {
     way: Way::Alone(run),
 };
 
-fn run(args: &DecodeRequest) -> Result<Outcome> {
+fn run(args: &Decode) -> Result<Outcome> {
     let (input, path) = (input(args)?, output(args));
     let name = input.to_string();
     let mut inputs = Inputs::none().forcing(args.force);
@@ -114,14 +115,14 @@ fn run(args: &DecodeRequest) -> Result<Outcome> {
 }
 
 /// The one recording that is read; a usage error if more is asked for than all of it.
-fn input(args: &DecodeRequest) -> Result<Endpoint> {
+fn input(args: &Decode) -> Result<Endpoint> {
     let is_part = args.session.is_some()
         || args.from.is_some()
         || args.to.is_some()
-        || args.split
-        || !args.messages.is_empty();
+        || args.split.is_some()
+        || !args.message.is_empty();
     match args.inputs.as_slice() {
-        [input] if args.formats.len() == 1 && !is_part => {
+        [input] if args.format.len() == 1 && !is_part => {
             Ok(if input.as_os_str() == "-" { Endpoint::Standard } else { Endpoint::File(input.clone()) })
         }
         _ => Err(usage(
@@ -130,7 +131,7 @@ fn input(args: &DecodeRequest) -> Result<Endpoint> {
     }
 }
 
-fn output(args: &DecodeRequest) -> PathBuf {
+fn output(args: &Decode) -> PathBuf {
     let stem = args.inputs.first().and_then(|input| input.file_stem()).unwrap_or_default();
     if says_directory(&args.output) {
         args.output.join(stem).with_extension("hum")

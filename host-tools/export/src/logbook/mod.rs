@@ -18,6 +18,7 @@ use hums_core::clock::Instant;
 use hums_core::health::{Level, Subsystem};
 use hums_core::usage::UsageCounter;
 
+use crate::args::Logbook;
 use crate::check::problem::Problem;
 use crate::check::text::sentence;
 use crate::checked::problems_of;
@@ -36,19 +37,6 @@ use crate::works::works;
 
 pub(crate) const BY_HAND: [&str; 6] =
     ["aircraft_details", "pilot", "activity", "pre_flight_inspection", "rectification", "remarks"];
-
-/// The request of `hums logbook`.
-#[derive(Clone, Debug)]
-pub struct LogbookRequest {
-    /// Logs, images, recordings, and folders of them.
-    pub inputs: Vec<PathBuf>,
-    /// The files to write, by their endings; a folder gets GUTMA's JSON.
-    pub outputs: Vec<PathBuf>,
-    /// The vehicle of all logs without a unique id.
-    pub vehicle: Option<String>,
-    /// Replace existing pages and JSON.
-    pub force: bool,
-}
 
 /// A place over ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,13 +119,13 @@ impl LogbookEntry {
 pub(crate) type Book = BTreeMap<String, Aircraft>;
 
 /// Runs `hums logbook`.
-pub fn run(args: &LogbookRequest) -> Result<Outcome> {
+pub fn run(args: &Logbook) -> Result<Outcome> {
     let (given, mut remarks) = naming::without_made(&args.inputs);
     let found = find(&given, false)?;
     remarks.extend(found.remarks.iter().cloned());
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
-    args.outputs.iter().try_for_each(|path| inputs.refuse(path))?;
-    let forms = args.outputs.iter().map(|path| Ok((Form::of(path)?, path.as_path())));
+    args.output.iter().try_for_each(|path| inputs.refuse(path))?;
+    let forms = args.output.iter().map(|path| Ok((Form::of(path)?, path.as_path())));
     let forms = forms.collect::<Result<Vec<_>>>()?;
     let sessions = sessions_of(&found.places);
     let works = works(&found.places, &sessions)?;

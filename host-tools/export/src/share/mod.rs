@@ -10,7 +10,6 @@ mod rules;
 
 use crate::mavlink::ids::{GLOBAL_POSITION_INT, PARAM_VALUE, STATUSTEXT};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::Result;
@@ -20,6 +19,7 @@ use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 use hums_link::{Check, Frame};
 
+use crate::args;
 use crate::context::Context;
 use crate::files::{Inputs, says_directory};
 use crate::format::{SingleFile, Totals, Writer as _};
@@ -55,28 +55,15 @@ impl TextRules {
     }
 }
 
-/// The request of `hums share`.
-#[derive(Clone, Debug)]
-pub struct ShareRequest {
-    /// A log, an image, or a recording.
-    pub input: PathBuf,
-    /// Only this session.
-    pub session: Option<String>,
-    /// The file to write.
-    pub output: PathBuf,
-    /// Replace an existing file.
-    pub force: bool,
-}
-
 /// Runs `hums share`.
-pub fn run(args: &ShareRequest) -> Result<Outcome> {
+pub fn run(args: &args::Share) -> Result<Outcome> {
     let (share, lossy) = copy(args)?;
     share.told(args).iter().try_for_each(|line| output::line(&printable::word(line)))?;
     Ok(Outcome::lossy(lossy))
 }
 
 /// Returns what was removed, and whether the recording has damage.
-fn copy(args: &ShareRequest) -> Result<(Share, bool)> {
+fn copy(args: &args::Share) -> Result<(Share, bool)> {
     let found = find(std::slice::from_ref(&args.input), false)?;
     found.tell(&[]);
     let wanted = found.name_of(args.session.as_deref())?;
@@ -136,7 +123,7 @@ impl Share {
     }
 
     /// Returns whether the recording has damage.
-    fn link(&mut self, place: &LogPlace, context: &Context, args: &ShareRequest) -> Result<bool> {
+    fn link(&mut self, place: &LogPlace, context: &Context, args: &args::Share) -> Result<bool> {
         let mut file = SingleFile::open(context, &args.output)?;
         let want = Needs { frames: true, ..Needs::default() };
         let (mut bytes, mut lossy) = (Vec::new(), false);
@@ -225,7 +212,7 @@ impl Share {
     }
 
     /// Returns whether the recording has damage.
-    fn own(&mut self, place: &LogPlace, context: &Context, args: &ShareRequest) -> Result<bool> {
+    fn own(&mut self, place: &LogPlace, context: &Context, args: &args::Share) -> Result<bool> {
         let mut file = Ulog::open(context, &args.output)?;
         let (mut story, mut lossy) = (Story::default(), false);
         let want = Needs { observations: true, ..Needs::default() };
@@ -262,7 +249,7 @@ impl Share {
     }
 
     /// The lines that the user gets.
-    fn told(&self, args: &ShareRequest) -> Vec<String> {
+    fn told(&self, args: &args::Share) -> Vec<String> {
         let times = if self.seen.contains_key(OBSERVATIONS) {
             "without times of day; `hums check` may find less in the copy"
         } else {

@@ -60,7 +60,7 @@ fn record(at_us: u64, packet: &Packet) -> Vec<u8> {
 /// The copy, and the lines about it.
 fn share(input: &Path, output: &Path) -> (Vec<u8>, Vec<String>) {
     let args =
-        ShareRequest { input: input.to_owned(), session: None, output: output.to_owned(), force: false };
+        args::Share { input: input.to_owned(), session: None, output: output.to_owned(), force: false };
     let (share, _) = copy(&args).expect("a copy");
     (fs::read(output).expect("the copy"), share.told(&args))
 }

@@ -77,8 +77,12 @@ impl GroupEncoder for Messages {
         let time_ns = entry.utc_us.unwrap_or_else(|| entry.at.as_micros()).saturating_mul(1000);
         let Some(payload) = entry.known else {
             return self.add(Topic::Opaque, time_ns, |out| {
-                let numbers =
-                    [frame.system().into(), frame.component().into(), frame.id().into(), frame.sequence().into()];
+                let numbers = [
+                    frame.system().into(),
+                    frame.component().into(),
+                    frame.id().into(),
+                    frame.sequence().into(),
+                ];
                 (1..).zip(numbers).for_each(|(number, value)| unsigned(out, number, value));
                 bytes(out, 5, frame.payload());
             });
@@ -339,29 +343,28 @@ mod tests {
     use std::fs;
     use std::path::{Path, PathBuf};
 
-    use crate::DecodeRequest;
+    use crate::args::{Decode, Split};
     use crate::formats::find;
 
     fn decode(input: &Path, output: &Path, format: &str, split: bool) {
-        let request = DecodeRequest {
+        let request = Decode {
             inputs: vec![input.to_owned()],
             salvage: false,
             session: None,
             output: output.to_owned(),
-            formats: vec![find(format).expect("a format")],
+            format: vec![find(format).expect("a format")],
             from: None,
             to: None,
-            split,
-            offset_s: 0.0,
+            split: split.then_some(Split::Flights),
+            offset: 0.0,
             findings: false,
             manifest: None,
-            program: "hums",
             vehicle: Some("quad7".to_owned()),
-            messages: Vec::new(),
+            message: Vec::new(),
             force: false,
             json: false,
         };
-        crate::run(&request).expect("decoded");
+        crate::run(&request, "hums").expect("decoded");
     }
 
     #[test]
