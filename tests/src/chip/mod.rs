@@ -26,8 +26,6 @@ pub const BAUD: f64 = 921_600.0;
 pub struct Feed {
     pieces: VecDeque<(Ps, Vec<u8>)>,
     free: Ps,
-    /// Relative error of the sender's clock.
-    pub fast: f64,
 }
 
 impl Feed {
@@ -50,7 +48,7 @@ impl Feed {
             let start = at.max(self.free);
             let fit = ((until - start.min(until)) as f64 * BAUD / 10.0 / SECOND as f64) as usize + 1;
             let now = bytes.len().min(fit);
-            self.free = machine.send(0, &bytes[..now], start, BAUD * (1.0 + self.fast));
+            self.free = machine.send(0, &bytes[..now], start, BAUD);
             if now < bytes.len() {
                 self.pieces.push_front((at, bytes[now..].to_vec()));
             }

@@ -53,8 +53,6 @@ pub struct Rig {
     frames: Vec<Vec<u8>>,
     next: usize,
     free: Ps,
-    /// Relative error of the sender's clock.
-    pub fast: f64,
     /// Times of its changes, and whether it was lit then.
     pub led: Vec<(Ps, bool)>,
 }
@@ -69,7 +67,7 @@ impl Rig {
     pub fn with(image: &Image, parts: Board, frames: Vec<Vec<u8>>, plans: Vec<Plan>) -> Self {
         let (machine, slot, medium) = board_with(image.clone(), parts, plans);
         let (wired, sent, led) = (wired(image), Vec::new(), Vec::new());
-        Self { wired, machine, slot, medium, sent, frames, next: 0, free: 0, fast: 0.0, led }
+        Self { wired, machine, slot, medium, sent, frames, next: 0, free: 0, led }
     }
 
     /// `busy`: the line is full of frames.
@@ -80,12 +78,7 @@ impl Rig {
             while busy && self.free < to {
                 let frame = self.frames[self.next % self.frames.len()].clone();
                 self.next += 1;
-                self.free = self.machine.send(
-                    usart(&self.wired.autopilot),
-                    &frame,
-                    self.free,
-                    BAUD * (1.0 + self.fast),
-                );
+                self.free = self.machine.send(usart(&self.wired.autopilot), &frame, self.free, BAUD);
                 self.sent.push((self.free, frame));
             }
             self.machine.run_until(to)?;
