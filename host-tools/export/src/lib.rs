@@ -85,7 +85,7 @@ use output::Schema;
 use plural::count;
 use selection::Selection;
 use source::epochs::Epochs;
-use source::find::{FoundRecordings, find, sessions_of};
+use source::find::{find, sessions_of};
 use source::item::{Gap, Item, Needs, RecordingSummary, Rows};
 use source::parts::{ItemCollector, PartReceiver};
 use source::recording::{Format, LogPlace};
@@ -113,21 +113,21 @@ pub fn run(args: &Decode, program: &'static str) -> Result<Outcome> {
 }
 
 fn decode(args: &Decode, program: &'static str, bucket: Option<Bucket>) -> Result<Outcome> {
-    let alone = |format: &&format::Format| if let Way::Alone(run) = format.way { Some(run) } else { None };
-    if let Some(run) = args.format.iter().find_map(alone) {
+    if let Some(run) = alone(args) {
         return run(args);
     }
     let formats = Formats::new(&args.format, args.split.is_some());
-    let (given, remarks) = naming::without_made(&args.inputs);
-    let found = find(&given, args.salvage)?;
-    remark(&found, &remarks);
+    let found = find(&args.inputs, args.salvage)?;
+    found.tell();
+    if found.places.is_empty() {
+        note!("no log was found, so nothing was written");
+    }
     let mut outcome = Outcome::lossy(found.is_lossy());
-    let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
+    let inputs = found.with_inputs(&args.inputs).forcing(args.force);
     let sessions = sessions_of(&found.places);
     let wanted = found.name_of(args.session.as_deref())?;
     let mut works = works(&found.places, &sessions)?;
-    inputs.refuse(&args.output)?;
-    args.manifest.iter().try_for_each(|to| inputs.refuse(to))?;
+    [&args.output].into_iter().chain(&args.manifest).try_for_each(|to| inputs.refuse(to))?;
     let is_wanted = |name: &String| wanted.as_ref().is_none_or(|wanted| wanted == name);
     let logs = works.iter().filter(|work| is_wanted(&work.log.name)).count();
     let standard_output = check_output(args, logs, &formats)?;
@@ -149,7 +149,7 @@ fn decode(args: &Decode, program: &'static str, bucket: Option<Bucket>) -> Resul
     let mut written = works.is_empty();
     let mut json = args.json.then(MadeJson::default);
     let (mut manifest, mut made, mut existing) = (Manifest::default(), BTreeSet::new(), Vec::new());
-    manifest.images(&found.images, &given);
+    manifest.images(&found.images, &args.inputs);
     let mut tell = |done: Done| {
         if !is_wanted(&done.name) {
             return Ok(());
@@ -175,7 +175,7 @@ fn decode(args: &Decode, program: &'static str, bucket: Option<Bucket>) -> Resul
         let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
         // A longer log of the same session may have replaced the tables of a shorter one.
         made.retain(|path| path.exists());
-        let roots: Vec<PathBuf> = given.iter().chain([&args.output]).cloned().collect();
+        let roots: Vec<PathBuf> = args.inputs.iter().chain([&args.output]).cloned().collect();
         manifest.write(program, to, &roots, &read, &made, &task.inputs)?;
     }
     if !written {
@@ -184,6 +184,11 @@ fn decode(args: &Decode, program: &'static str, bucket: Option<Bucket>) -> Resul
         );
     }
     Ok(outcome)
+}
+
+/// The format of the request that is written alone.
+fn alone(args: &Decode) -> Option<fn(&Decode) -> Result<Outcome>> {
+    args.format.iter().find_map(|format| if let Way::Alone(run) = format.way { Some(run) } else { None })
 }
 
 fn tell_existing(existing: &[String]) {
@@ -201,7 +206,7 @@ fn check_request(args: &Decode) -> Result<()> {
     if args.findings && !args.format.iter().any(|format| format.about.name == "tlog") {
         return Err(usage_error("--findings is for --format tlog; the tables have the findings anyway"));
     }
-    if args.manifest.is_some() && args.format.iter().any(|format| matches!(format.way, Way::Alone(_))) {
+    if args.manifest.is_some() && alone(args).is_some() {
         return Err(usage_error("--manifest: a log of one recording has none; hums info --verify makes it"));
     }
     let is_of_fleet = |format: &&format::Format| matches!(format.about.files, Files::Fleet(_));
@@ -214,13 +219,6 @@ fn check_request(args: &Decode) -> Result<()> {
         return Err(usage_error("--manifest and -o are one file: the manifest would replace the output"));
     }
     Ok(())
-}
-
-fn remark(found: &FoundRecordings, remarks: &[String]) {
-    found.tell(remarks);
-    if found.places.is_empty() {
-        note!("no log was found, so nothing was written");
-    }
 }
 
 /// Neighbour of the requested log, which may show how that one ends.

@@ -1,20 +1,17 @@
 //! Names of a session's files ([`crate::logs::naming`]).
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Result;
 use sha2::{Digest as _, Sha256};
 
-use crate::files::Folder;
 use crate::hex::hex;
 use crate::logs::Log;
 use crate::logs::board::{HEADING_GROUPS, board_of};
 use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
 use crate::logs::groups::Groups;
-use crate::logs::naming::{ends_with_identity, segment_name, session_name};
+use crate::logs::naming::{segment_name, session_name};
 use crate::logs::sessions::Sessions;
 use crate::source::recording::LogPlace;
 
@@ -152,58 +149,6 @@ pub fn names(logs: &[(&LogPlace, Traits)], sessions: &Sessions) -> Vec<LogFileNa
     logs.iter().enumerate().map(name).collect()
 }
 
-/// Removes our own outputs from the inputs, with remarks: a second `hums decode * -o .` gets those of the first. A
-/// single input is kept.
-pub fn without_made(inputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
-    let (made, others): (Vec<&PathBuf>, Vec<&PathBuf>) = inputs.iter().partition(|input| is_made(input));
-    if others.is_empty() {
-        return (inputs.to_vec(), Vec::new());
-    }
-    let remark =
-        |path: &&PathBuf| format!("{}: was made by hums of a recording, and is passed over", path.display());
-    (others.into_iter().cloned().collect(), made.iter().map(remark).collect())
-}
-
-/// An output of this program other than a recording, by name or stamp.
-pub fn is_made(path: &Path) -> bool {
-    let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy());
-    if path.is_dir() {
-        return Folder::is_ours(path) || name == ".hums-fleet" || is_table(path);
-    }
-    if name.ends_with(".html") && says_report(path) {
-        return true;
-    }
-    let name = name.strip_suffix(".gz").unwrap_or(&name);
-    let gaps = name.strip_suffix(".tlog.gaps.csv");
-    let other = || name.rsplit_once('.').filter(|(_, ending)| !RECORDINGS.contains(ending));
-    gaps.or_else(|| Some(other()?.0)).is_some_and(ends_with_identity)
-}
-
-/// Whether a folder is a table of a fleet: it has a folder for each date and nothing else.
-fn is_table(folder: &Path) -> bool {
-    let Ok(entries) = std::fs::read_dir(folder) else { return false };
-    let mut names = entries.filter_map(|entry| Some(entry.ok()?.file_name())).peekable();
-    names.peek().is_some() && names.all(|name| name.to_string_lossy().starts_with("date="))
-}
-
-/// `decode` makes some of them.
-const RECORDINGS: [&str; 6] = ["hum", "tlog", "raw", "bin", "log", "ulg"];
-
-/// A report by its head: the table of a folder's pages has no session in its name.
-fn says_report(path: &Path) -> bool {
-    head(path).windows(GENERATOR.len()).any(|part| part == GENERATOR)
-}
-
-/// Empty if unreadable.
-fn head(path: &Path) -> Vec<u8> {
-    let mut head = Vec::new();
-    // Bytes before an error count.
-    let _ = File::open(path).and_then(|file| file.take(1_024).read_to_end(&mut head));
-    head
-}
-
-const GENERATOR: &[u8] = b"name=\"generator\" content=\"hums report\"";
-
 fn file_name(place: &LogPlace) -> String {
     let name = place.path().and_then(Path::file_name);
     name.map_or_else(|| "recording".to_owned(), |name| cut(name.to_string_lossy().into_owned()))
@@ -225,28 +170,6 @@ fn base(log: &Log) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn outputs_are_known_by_their_names_and_recordings_are_not_taken_for_them() {
-        for made in [
-            "00001-box3f-s1a2b3c4d.jsonl",
-            "log-s1a2b3c4d-2.lp",
-            "log-s1a2b3c4d.kml",
-            "a.tlog-r00112233.tlog.gaps.csv",
-        ] {
-            assert!(is_made(Path::new(made)), "{made}");
-        }
-        for other in [
-            "log-s1a2b3c4d.hum",
-            "log-s1a2b3c4d.tlog",
-            "log-s1a2b3c4d.ulg",
-            "log-s1a2b3c4.jsonl",
-            "notes.jsonl",
-            "x.html",
-        ] {
-            assert!(!is_made(Path::new(other)), "{other}");
-        }
-    }
 
     #[test]
     fn a_name_that_is_as_long_as_it_may_be_leaves_room_for_what_follows() {

@@ -93,9 +93,7 @@ impl World {
             // A radio is a system of its own.
             Some((source, radio @ Observation::TelemetryRadio(_))) => {
                 for (system, craft) in &mut self.crafts {
-                    let mut history =
-                        histories.as_deref_mut().map(|histories| histories.entry(*system).or_default());
-                    craft.observe(at, source, &radio, &mut history);
+                    craft.observe(at, source, &radio, &mut history_of(&mut histories, *system));
                 }
             }
             _ if !known && frame.id() == PARAM_VALUE && self.early.len() < EARLY_MAX => {
@@ -104,7 +102,7 @@ impl World {
             _ => {}
         }
         if let Some(craft) = self.crafts.get_mut(&system) {
-            let mut history = histories.map(|histories| histories.entry(system).or_default());
+            let mut history = history_of(&mut histories, system);
             craft.frame(at, frame, &mut history);
             if !known {
                 let told = self.early.extract_if(.., |(of, _)| *of == system);
@@ -144,8 +142,7 @@ impl World {
             Entry::Parameter(..) | Entry::More(_) => {
                 // Parameters come before the vehicle is known.
                 let only = self.crafts.keys().next().copied().unwrap_or(1);
-                let history = histories.map(|histories| histories.entry(only).or_default());
-                return match (history, entry) {
+                return match (history_of(&mut histories, only), entry) {
                     (Some(history), Entry::Parameter(name, value)) => history.parameter(at, name, *value),
                     (Some(history), Entry::More(more)) => history.more(at, more),
                     _ => {}
@@ -162,7 +159,7 @@ impl World {
             self.meet(at, system);
         }
         let Some(craft) = self.crafts.get_mut(&system) else { return };
-        let mut history = histories.map(|histories| histories.entry(system).or_default());
+        let mut history = history_of(&mut histories, system);
         match entry {
             Entry::Observation(source, observation) => craft.observe(at, *source, observation, &mut history),
             Entry::Text(text) => craft.text(text.clone(), &mut history),
@@ -204,8 +201,7 @@ impl World {
             MonitorRecord::CellsUnknown => {
                 let owner = self.owner.and_then(|owner| Some((owner, self.crafts.get_mut(&owner)?)));
                 if let Some((owner, craft)) = owner {
-                    let mut history = histories.map(|histories| histories.entry(owner).or_default());
-                    craft.say_cells_unknown(at, &mut history);
+                    craft.say_cells_unknown(at, &mut history_of(&mut histories, owner));
                 }
             }
             MonitorRecord::Checked
@@ -220,20 +216,19 @@ impl World {
         self.pass(from, to, histories.as_deref_mut());
         for (system, craft) in &mut self.crafts {
             craft.miss(if self.owner == Some(*system) { frames } else { 0 });
-            if let Some(histories) = histories.as_deref_mut() {
-                histories.entry(*system).or_default().gap(Some((from, to)));
+            if let Some(history) = history_of(&mut histories, *system) {
+                history.gap(Some((from, to)));
             }
         }
     }
 
     /// The monitor here finds the same from frames, except for findings about the box.
-    fn found_on_board(&mut self, finding: &BoxFinding, histories: Option<&mut Histories>) {
+    fn found_on_board(&mut self, finding: &BoxFinding, mut histories: Option<&mut Histories>) {
         let Some(owner) = self.owner else { return };
         let is_new = finding.subsystem == Subsystem::Recorder
             || self.crafts.get_mut(&owner).is_some_and(|craft| craft.found_on_board(finding));
-        if let Some(histories) = histories.filter(|_| is_new) {
-            let note = Note::told(finding);
-            histories.entry(owner).or_default().note(finding.at, note);
+        if is_new && let Some(history) = history_of(&mut histories, owner) {
+            history.note(finding.at, Note::told(finding));
         }
     }
 
@@ -260,10 +255,8 @@ impl World {
     fn step_until(&mut self, now: Instant, mut histories: Option<&mut Histories>) {
         while self.next_tick <= now {
             for (system, craft) in &mut self.crafts {
-                let mut history =
-                    histories.as_deref_mut().map(|histories| histories.entry(*system).or_default());
                 let found = &mut self.found;
-                craft.tick(self.next_tick, &mut history, &mut |finding| {
+                craft.tick(self.next_tick, &mut history_of(&mut histories, *system), &mut |finding| {
                     if found.len() < FOUND_MAX {
                         found.push((self.next_tick, *system, *finding));
                     }
@@ -272,6 +265,11 @@ impl World {
             self.next_tick = self.next_tick + TICK;
         }
     }
+}
+
+/// Of a vehicle; a new one is empty.
+fn history_of<'a>(histories: &'a mut Option<&mut Histories>, system: u8) -> Option<&'a mut History> {
+    histories.as_deref_mut().map(|histories| histories.entry(system).or_default())
 }
 
 #[cfg(test)]

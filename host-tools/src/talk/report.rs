@@ -77,7 +77,7 @@ pub fn run(args: &cli::BoxReport) -> Result<Outcome> {
     inputs.refuse(&args.output)?;
     let mut logs = Vec::new();
     if let Some(found) = &found {
-        found.tell(&[]);
+        found.tell();
         let all: Vec<&Log> = found.places.iter().filter_map(|place| place.own()).collect();
         if all.is_empty() {
             bail!("no log of a HUMS box is in there; name a card, an image or a log");

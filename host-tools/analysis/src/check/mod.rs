@@ -83,7 +83,7 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
     let past = EarlierFlights::of(Limits::new(&params::read(args.params)?), args.past, args.system)?;
     let found = find_each(args.inputs, args.salvage)?.of_system(args.system)?;
     let wanted = found.name_of(args.session)?;
-    found.tell(&[]);
+    found.tell();
     let mut failed = found.failed.len();
     let unread = |name: &str, error: &anyhow::Error| {
         if args.json {

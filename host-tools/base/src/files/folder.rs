@@ -66,11 +66,6 @@ impl Folder {
         }
     }
 
-    /// Whether the program made a folder.
-    pub fn is_ours(path: &Path) -> bool {
-        Stamp::of(path).is_some()
-    }
-
     /// The folder's path, as the user named it.
     pub fn path(&self) -> &Path {
         &self.path

@@ -8,7 +8,7 @@ mod gutma;
 mod page;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
@@ -22,10 +22,10 @@ use crate::args::Logbook;
 use crate::check::problem::Problem;
 use crate::check::text::sentence;
 use crate::checked::problems_of;
-use crate::files::{Inputs, says_directory};
+use crate::files::says_directory;
 use crate::identity::{Preview, RecordingContent, identity};
 use crate::logs::side_by_side::side_by_side;
-use crate::naming::{self, LogFileName};
+use crate::naming::LogFileName;
 use crate::outcome::{Outcome, usage as usage_error};
 use crate::output;
 use crate::plural::count;
@@ -120,10 +120,9 @@ pub(crate) type Book = BTreeMap<String, Aircraft>;
 
 /// Runs `hums logbook`.
 pub fn run(args: &Logbook) -> Result<Outcome> {
-    let (given, mut remarks) = naming::without_made(&args.inputs);
-    let found = find(&given, false)?;
-    remarks.extend(found.remarks.iter().cloned());
-    let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
+    let found = find(&args.inputs, false)?;
+    let mut remarks = found.remarks.clone();
+    let inputs = found.with_inputs(&args.inputs).forcing(args.force);
     args.output.iter().try_for_each(|path| inputs.refuse(path))?;
     let forms = args.output.iter().map(|path| Ok((Form::of(path)?, path.as_path())));
     let forms = forms.collect::<Result<Vec<_>>>()?;

@@ -65,7 +65,7 @@ pub fn run(args: &args::Share) -> Result<Outcome> {
 /// Returns what was removed, and whether the recording has damage.
 fn copy(args: &args::Share) -> Result<(Share, bool)> {
     let found = find(std::slice::from_ref(&args.input), false)?;
-    found.tell(&[]);
+    found.tell();
     let wanted = found.name_of(args.session.as_deref())?;
     let mut places =
         found.places.iter().filter(|place| wanted.as_ref().is_none_or(|name| *name == place.name));

@@ -124,20 +124,6 @@ pub fn make_unique<'a>(names: impl Iterator<Item = &'a mut String>) {
     }
 }
 
-/// Whether a file's name, without its ending, ends with an identity: a session, `s1a2b3c4d`, or another
-/// recording's content, `r1a2b3c4d`; a further log of a session has a number after it.
-pub fn ends_with_identity(stem: &str) -> bool {
-    let is_identity = |name: &str| {
-        let digits = name.rsplit_once('-').and_then(|(_, identity)| identity.strip_prefix(['s', 'r']));
-        digits.is_some_and(|digits| {
-            let is_hex = digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
-            digits.len() == SESSION_DIGITS && is_hex
-        })
-    };
-    let numbered = stem.rsplit_once('-').filter(|(_, number)| number.parse::<u32>().is_ok());
-    is_identity(stem) || numbered.is_some_and(|(stem, _)| is_identity(stem))
-}
-
 fn is_of_session(of: &str) -> bool {
     let session = match of.rsplit_once('-') {
         Some((recorder, session)) if recorder.starts_with("box") => session,
@@ -161,20 +147,6 @@ mod tests {
         assert_eq!((of(&part), of(Path::new("a.part.hum"))), (Some("s1a2b3c4d".to_owned()), None));
         for other in ["00042-s1a2b3c4d_07.HUM", "a.part", "part.HUM", "a.part.tlog"] {
             assert!(!is_part(Path::new(other)), "{other}");
-        }
-    }
-
-    #[test]
-    fn what_is_made_of_a_log_is_known_by_its_name() {
-        for (stem, expected) in [
-            ("00001-box3f-s1a2b3c4d", true),
-            ("a.tlog-r00112233-2", true),
-            ("log-s1a2b3c4", false),
-            ("log-s1A2b3c4d", false),
-            ("log-2", false),
-            ("s1a2b3c4d", false),
-        ] {
-            assert_eq!(ends_with_identity(stem), expected, "{stem}");
         }
     }
 

@@ -11,7 +11,7 @@ use anyhow::{Context as _, Result, anyhow, bail};
 use super::format::{Detected, KNOWN, begins_recording, detect, format_of, hint, is_recording, start_of};
 use super::recording::{LogPlace, of_one_vehicle};
 use crate::archive::GZIP;
-use crate::files::{FileId, why_unread};
+use crate::files::{FileId, Inputs, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::naming::{make_unique, name_after};
 use crate::logs::sessions::{Sessions, copy_words, first_session};
@@ -238,9 +238,9 @@ impl FoundRecordings {
         })
     }
 
-    /// Prints the remarks, after those `before`.
-    pub fn tell(&self, before: &[String]) {
-        for remark in before.iter().chain(&self.remarks) {
+    /// Prints the remarks.
+    pub fn tell(&self) {
+        for remark in &self.remarks {
             note!("{remark}");
         }
         for image in self.images.iter().filter(|image| !image.damage.is_empty()) {
@@ -252,6 +252,11 @@ impl FoundRecordings {
     pub fn name_of(&self, asked: Option<&str>) -> Result<Option<String>> {
         let index = asked.map(|name| self.session(name)).transpose()?;
         Ok(index.and_then(|index| self.places.get(index)).map(|place| place.name.clone()))
+    }
+
+    /// The given inputs with all files that are read, which no output may replace.
+    pub fn with_inputs(&self, given: &[PathBuf]) -> Inputs {
+        Inputs::of(given.iter().map(PathBuf::as_path).chain(self.paths()))
     }
 
     /// All files.

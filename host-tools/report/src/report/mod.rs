@@ -33,7 +33,7 @@ use crate::followed::{EndResolver, HELD_MAX};
 use crate::logs::sessions::copy_words;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
-use crate::naming::{LogFileName, Names, Traits, without_made};
+use crate::naming::{LogFileName, Names, Traits};
 use crate::outcome::{Outcome, or_skipped, usage};
 use crate::output::{self, Schema};
 use crate::plural::count;
@@ -93,9 +93,8 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
 /// Runs `hums report`, and hands the pages to `put` instead of writing files.
 pub fn run_into(args: &Request<'_>, put: &mut PageSink<'_>) -> Result<Outcome> {
     let output = &args.output.map_or_else(|| beside(args.inputs), |output| Ok(output.to_owned()))?;
-    let (given, remarks) = without_made(args.inputs);
-    let mut found = find(&given, false)?.of_system(args.system)?;
-    found.tell(&remarks);
+    let mut found = find(args.inputs, false)?.of_system(args.system)?;
+    found.tell();
     if let Some(place) = found.places.iter().find(|place| place.is_standard()) {
         bail!("{}: is read twice for a page; give a file", place.title)
     }
@@ -120,7 +119,7 @@ pub fn run_into(args: &Request<'_>, put: &mut PageSink<'_>) -> Result<Outcome> {
             shown(output)
         )));
     }
-    let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
+    let inputs = found.with_inputs(args.inputs).forcing(args.force);
     inputs.refuse(output)?;
     if wanted.directory {
         // Before any page is written. That of a session is refused by itself, when its name is known.
