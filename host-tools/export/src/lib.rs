@@ -2,8 +2,8 @@
 //!
 //! Each format is a file in [`formats`].
 //!
-//! A log is read once (twice if its vehicle must be known first), and an unchecked one is judged in the same
-//! reading. Its groups are encoded in parallel, and written in order. Several logs are decoded in parallel,
+//! A log is read for its time of day (or its vehicle, if that must be known first), then decoded; an unchecked one is
+//! judged in the same reading. Its groups are encoded in parallel, and written in order. Several logs are decoded in parallel,
 //! few enough that memory stays bounded.
 //!
 //! A log's files are named after its session ([`naming`]).
@@ -439,7 +439,7 @@ impl Task<'_> {
         let log = work.log;
         let flights = if self.formats.split { flights(log)? } else { Vec::new() };
         if flights.is_empty() {
-            return self.decode_part(work, name, self.context(work)?);
+            return self.decode_part(work, name, &self.context(work)?);
         }
         let mut done = Done::of(log);
         for (number, span) in (1..).zip(flights) {
@@ -448,23 +448,16 @@ impl Task<'_> {
             context.identity.session = format!("{}-flight{number}", context.identity.session);
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
             let name = format!("{name}-flight{number}");
-            done.add(self.decode_part(work, &name, context)?);
+            done.add(self.decode_part(work, &name, &context)?);
         }
         Ok(done)
     }
 
-    fn decode_part(&self, work: &NamedLog<'_>, name: &str, mut context: Context) -> Result<Done> {
+    fn decode_part(&self, work: &NamedLog<'_>, name: &str, context: &Context) -> Result<Done> {
         let log = work.log;
         let mut remarks = Vec::new();
-        remarks.extend(check_clock(&log.name, &context)?);
-        let mut read = self.read(log, name, &context);
-        if let Some(epoch_us) = self.better_epoch(log, &context, &read) {
-            // Only its last group knew better: all of it again, with that.
-            drop(read);
-            context.epochs = Epochs::of(epoch_us);
-            read = self.read(log, name, &context);
-        }
-        let (summary, mut writers, checked) = read?;
+        remarks.extend(check_clock(&log.name, context)?);
+        let (summary, mut writers, checked) = self.read(log, name, context)?;
         if writers.is_empty() && context.selection.is_part() {
             remarks.push(nothing_of(log, &summary, &context.selection));
             return Ok(Done { remarks, ..Done::of(log) });
@@ -504,8 +497,7 @@ impl Task<'_> {
         let judges = self.formats.has_records() && !work.traits.has_board();
         match work.log.own() {
             Some(log) if !self.formats.about().any(|about| about.needs_identity) => {
-                let epoch = if self.standard_output { reader::epoch(log) } else { reader::likely_epoch(log) };
-                context.epochs = Epochs::of(epoch?);
+                context.epochs = Epochs::of(reader::epoch(log)?);
                 context.judges = judges;
             }
             _ => {
@@ -517,23 +509,6 @@ impl Task<'_> {
             }
         }
         Ok(context)
-    }
-
-    /// UTC at power-on from a reading, if the log's files were begun with another one.
-    #[expect(clippy::option_option, reason = "it may be known now that nobody told it")]
-    fn better_epoch(
-        &self,
-        place: &LogPlace,
-        context: &Context,
-        read: &Result<Read<'_>>,
-    ) -> Option<Option<u64>> {
-        let epoch_us = match (read, place.own()) {
-            (_, None) => return None,
-            _ if self.standard_output => return None,
-            (Ok((summary, ..)), _) => summary.ending.as_ref().and_then(|ending| ending.summary.epoch_us),
-            _ => return None,
-        };
-        Some(epoch_us).filter(|epoch_us| *epoch_us != context.epochs.whole())
     }
 
     fn read<'a>(&self, place: &LogPlace, name: &str, context: &'a Context) -> Result<Read<'a>> {

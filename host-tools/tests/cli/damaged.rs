@@ -26,6 +26,21 @@ fn a_log_that_is_cut_in_flight_is_told_in_the_same_words_by_every_command() {
 }
 
 #[test]
+fn the_time_of_day_is_known_in_a_short_log_with_a_damaged_sector() {
+    let dir = copied(2);
+    let whole = fs::read(dir.path().join("copied/00002_00.HUM")).expect("a log");
+    for (sectors, damaged) in [(60, 40), (66, 64), (70, 64)] {
+        let mut log = whole[..sectors * BLOCK].to_vec();
+        log[damaged * BLOCK + 100] ^= 4;
+        fs::write(dir.path().join("short.hum"), log).expect("written");
+        run(dir.path(), "decode short.hum -o short.jsonl --format jsonl --force", 3);
+        let file = fs::read_to_string(dir.path().join("short.jsonl")).expect("text");
+        let stream = text(&run(dir.path(), "decode short.hum -o - --format jsonl", 3));
+        assert!(file == stream && file.contains("\"time_utc\":\"2026-"), "{sectors} {damaged}");
+    }
+}
+
+#[test]
 fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
     let dir = copied(1);
     let path = dir.path().join("copied/00001_00.HUM");

@@ -470,35 +470,26 @@ fn hand_on<C: EntryCollector>(
 }
 
 /// UTC at power-on, microseconds since 1970; the last value counts.
+///
+/// Decodes the last group that has its beginning; earlier values are in the preambles.
 pub fn epoch(log: &Log) -> Result<Option<u64>> {
-    last_epoch(log, |_| true)
-}
-
-/// Without decoding if a group's start has it. May miss the last group's value; [`LogSummary::epoch_us`] is
-/// exact.
-pub fn likely_epoch(log: &Log) -> Result<Option<u64>> {
-    last_epoch(log, |epoch| epoch.is_none())
-}
-
-fn last_epoch(log: &Log, go_on: impl Fn(Option<u64>) -> bool) -> Result<Option<u64>> {
     let mut groups = Groups::new(log);
     let mut decoder = Box::new(GroupDecoder::new());
     let (mut epoch, mut last) = (None, Vec::new());
     while let Some(group) = groups.next_group()? {
-        if let Some(first) = group.first() {
-            // The preamble is plain.
-            if decoder.push(&first.header, &first.sector).is_ok() {
-                epoch = decoder.preamble().epoch_micros.or(epoch);
-            }
+        if let Some(first) = group.first()
+            && decoder.push(&first.header, &first.sector).is_ok()
+        {
+            epoch = decoder.preamble().epoch_micros.or(epoch);
+            last = group;
         }
-        last = group;
     }
     // No preamble follows.
     for step in &last {
-        if !go_on(epoch) || decoder.push(&step.header, &step.sector).is_err() {
+        if decoder.push(&step.header, &step.sector).is_err() {
             break;
         }
-        while let (true, Some(Ok(entry))) = (go_on(epoch), decoder.next_entry()) {
+        while let Some(Ok(entry)) = decoder.next_entry() {
             if let Entry::Record { record: Record::Clock(clock), .. } = entry {
                 epoch = Some(clock.epoch_micros());
             }
