@@ -10,7 +10,7 @@
 //! that time. The delay may be longer, by up to [`LATE_S`]. The effect of that on a changing force is taken off; a
 //! steady force has none. A leap of velocity counts for little ([`LEAP_MPS2`]). Vibration makes the force uncertain
 //! ([`SHAKE_PART`]): samples are few, and fold vibration into an offset. A place that is repeated bit for bit is
-//! skipped.
+//! skipped. So is a course: receivers hold it while they are slow (UBX-13003221, "Freezing the course over ground").
 //!
 //! A wrong heading turns a horizontal force without changing its length. If the lengths agree, the effect of 30
 //! degrees on the change of velocity is taken off. So a compass that led the attitude astray hardly shows here.
@@ -22,7 +22,7 @@ use crate::observation::Gnss;
 use crate::residual::{AT_ONCE, smooth};
 use crate::rotation::to_earth;
 use crate::time::{BootMs, Millis, PAUSE, Stamp};
-use crate::units::{GRAVITY, MetresPerSecond2, norm};
+use crate::units::{GRAVITY, MetresPerSecond2, Radians, norm};
 use crate::vehicle::Vehicle;
 
 const CLIMB_AGE: Millis = Millis::from_millis(500);
@@ -50,6 +50,7 @@ state! {
         force_before: Option<[f32; 3]>,
         /// The last velocity, m/s, and its time if it is compared.
         velocity: [f32; 3],
+        course: Option<Radians>,
         at: Stamp,
         /// The force, and the part that is missing in the velocity, both smoothed, m/s2.
         force: [f32; 3],
@@ -95,11 +96,15 @@ impl ImuGnssResidual {
         let on_rotors = gates.are(gates::ROTORS);
         let judged = gnss.is_exact() && gates.are(gates::SETTLED | gates::CLEAR | gates::ONE_FRAME);
         let climb_mps = if on_rotors { climb_within(at, vehicle, CLIMB_AGE) } else { Some(0.0) };
+        let is_held = core::mem::replace(&mut self.course, gnss.course) == gnss.course;
         let (Some(speed), Some(course), Some(climb_mps), true) = (gnss.speed, gnss.course, climb_mps, judged)
         else {
             (self.at, self.residual) = (Stamp::NONE, None);
             return;
         };
+        if is_held && speed.0 > 0.0 {
+            return;
+        }
         let velocity = [speed.0 * libm::cosf(course.0), speed.0 * libm::sinf(course.0), -climb_mps];
         let step = self.at.age(at).filter(|step| *step > Millis::ZERO && *step <= PAUSE);
         self.at = Stamp::at(at);
