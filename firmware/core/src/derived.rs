@@ -81,8 +81,11 @@ impl Derived {
                 }
             }
             Observation::Outputs(outputs) => {
-                let level =
-                    self.crosschecks.residuals.gates.are(gates::SETTLED | gates::CLEAR | gates::LEVEL);
+                let level = self
+                    .crosschecks
+                    .residuals
+                    .gates
+                    .are(gates::SETTLED | gates::CLEAR | gates::LEVEL | gates::CONTROLLED);
                 self.motors.outputs.take(at, outputs, vehicle, flight, level);
             }
             Observation::Gnss(gnss) => {

@@ -176,6 +176,10 @@ state! {
         flew_at: Option<BootMs>,
         changing_since: Option<BootMs>,
         seen_on_ground: bool,
+        /// Pressure or position show it away from the ground; without both, the autopilot does not call it landed.
+        pub(crate) is_clear: bool,
+        /// Since when the estimate of height and speed has been lost.
+        lost_since: Stamp,
         arming: Arming,
         beat: Beat,
         heard_at: BootMs,
@@ -275,11 +279,13 @@ impl Flight {
     ) -> (Option<MishapChange>, Option<FlightEvent>) {
         self.note_power(now, vehicle, params);
         self.motion.step(now, vehicle);
+        self.lost_since.run(self.loses_estimate(now, vehicle), now, Millis::ZERO);
         self.note_support(now, vehicle, params);
         self.note_still(now, vehicle);
         self.judge_disarming(now, vehicle, params);
         self.judge_shock(now, vehicle, params);
         let votes = self.ask(now, vehicle);
+        self.is_clear = votes.is_clear;
         self.doubt(now, vehicle, votes);
         let seen = self.signs.seen.take();
         let change = match (self.stage, seen) {

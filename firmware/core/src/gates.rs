@@ -1,10 +1,10 @@
 //! Conditions of the flight, as bits: computed once a step.
 
 use crate::flight::Flight;
-use crate::motion::{CLEAR_M, climb_mps};
-use crate::observation::{Gnss, LandedState, VehicleKind};
+use crate::motion::climb_mps;
+use crate::observation::{Gnss, VehicleKind};
 use crate::thrust::Power;
-use crate::time::{BootMs, FRESH, Millis, PAUSE, SILENT, Stamp};
+use crate::time::{BootMs, Millis, PAUSE, Stamp};
 use crate::vehicle::Vehicle;
 
 /// In the air.
@@ -66,7 +66,7 @@ impl Gates {
         for (gate, is_open) in [
             (AIRBORNE, flight.airborne()),
             (SETTLED, flight.is_settled(now)),
-            (CLEAR, is_clear(now, vehicle)),
+            (CLEAR, flight.is_clear),
             (STILL, vehicle.inertial.turns_little(now, TURNED)),
             (LEVEL, is_level(now, vehicle)),
             (ROTORS, rotors),
@@ -83,13 +83,4 @@ impl Gates {
 fn is_level(now: BootMs, vehicle: &Vehicle) -> bool {
     let climbs = climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > LEVEL_MPS);
     !climbs && !vehicle.attitude.get().is_some_and(|attitude| attitude.lean_rad() > LEANS_RAD)
-}
-
-fn is_clear(now: BootMs, vehicle: &Vehicle) -> bool {
-    let landed = vehicle.landed.within(now, SILENT);
-    !matches!(landed, Some(LandedState::TakingOff | LandedState::Landing | LandedState::OnGround))
-        && vehicle
-            .global
-            .within(now, FRESH)
-            .is_none_or(|global| libm::fabsf(global.relative_altitude.0) > CLEAR_M)
 }

@@ -7,8 +7,8 @@ use hums_core::Monitor;
 use hums_core::health::Finding;
 use hums_core::health::Level::{self, Critical, Warning};
 use hums_core::observation::{
-    Air, Attitude, AttitudeSetpoint, Autopilot, Estimator, EstimatorScale, Imu, MOTORS_MAX, Observation,
-    Outputs, SecondEstimate, VehicleKind, WantedRates,
+    Air, Attitude, AttitudeSetpoint, Autopilot, Estimator, EstimatorScale, Imu, LandedState, MOTORS_MAX,
+    Observation, Outputs, SecondEstimate, VehicleKind, WantedRates,
 };
 use hums_core::parameters::Params;
 use hums_core::status::LinkReading;
@@ -237,7 +237,6 @@ const FOUND: &[Found] = &[
         it.quad.vibration.levels = [Some(5.0), Some(18.0), Some(5.0)];
     }),
     ("compass_heading", &[0], Warning, 1_000, |_, it, _| turned(it, -25.0)),
-    ("compass_heading", &[0], Warning, 1_000, |_, it, _| turned(it, 25.0)),
     ("compass_heading", &[0], Warning, 1_000, |_, it, _| turned(it, 170.0)),
     ("baro_height", &[0], Warning, 3_000, |_, it, _| rises(it, -1.5)),
     ("baro_height", &[0], Warning, 25_000, |ms, it, _| rises(it, 0.06 * since_s(ms))),
@@ -247,7 +246,6 @@ const FOUND: &[Found] = &[
     // It stands out by 6 to 8 %, which is not a warning at once.
     ("motor_output", &[2], Warning, 28_000, |_, it, of| it.pulses[of] += 44.0),
     ("roll_rate", &[0], Critical, 2_500, |_, it, _| it.wanted[0] = -2.5),
-    ("pitch_rate", &[0], Critical, 2_500, |_, it, _| it.wanted[1] = -2.5),
     ("thrust_lost", &[0], Warning, 2_500, |_, it, _| it.quad.throttle = 1.0),
     ("ekf_climb", &[0], Warning, 3_000, |ms, it, _| climbs(it, since_s(ms), 3.0, -7.0)),
     ("ekf_climb", &[0], Critical, 3_000, |ms, it, _| climbs(it, since_s(ms), 3.0, -17.0)),
@@ -276,6 +274,10 @@ const FOUND_OF: &[(Begins, Found)] = &[
         ("vibration_rise", &[0], Warning, 6_000, |_, it, _| it.quad.vibration.levels[0] = Some(18.0)),
     ),
     (|it| it.quad.throttle = 0.0, ("roll_rate", &[0], Critical, 2_500, |_, it, _| it.wanted[0] = -2.5)),
+    (
+        |it| it.quad.landed = Some(LandedState::Landing),
+        ("pitch_rate", &[0], Critical, 2_500, |_, it, _| it.wanted[1] = -2.5),
+    ),
     (has_second, ("ahrs2_tilt", &[0], Warning, 2_500, |_, it, _| it.second = Some([0.7, 0.0, 0.0]))),
     (has_second, ("ahrs2_height", &[0], Warning, 2_500, |_, it, _| it.second = Some([0.0, -11.0, 0.0]))),
     (has_second, ("ahrs2_height", &[0], Critical, 2_500, |_, it, _| it.second = Some([0.0, -20.0, 0.0]))),

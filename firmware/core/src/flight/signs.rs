@@ -177,7 +177,7 @@ impl Flight {
                     && self.airborne()
                     && !self.stage.is_mishap()
                     && climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < STILL_MPS)
-                    && self.is_away(at, vehicle);
+                    && self.is_clear;
                 if let Some(part) = throttle(at, vehicle) {
                     // Many autopilots and logs tell none, which is 0.
                     self.thrust.take(at, part, hovers && part > 0.0);
@@ -309,7 +309,7 @@ impl Flight {
             && self.arming.is_on
             && on_rotors(at, vehicle)
             && !is_made_to_turn(vehicle)
-            && !vehicle.inertial.contradicts(at);
+            && self.believes_attitude(at, vehicle);
         if self.signs.overturned.take(at, over).is_some_and(|span| span >= LIES) {
             self.see(at, MishapKind::Overturned, tilt_deg, params);
         }

@@ -61,6 +61,8 @@ pub(super) struct Votes {
     pub(super) flies: u8,
     pub(super) stands: u8,
     pub(super) known: u8,
+    /// Away from the ground, as far as that is known.
+    pub(super) is_clear: bool,
 }
 
 impl Votes {
@@ -82,10 +84,11 @@ impl Votes {
 impl Flight {
     /// Asks all witnesses.
     pub(super) fn ask(&self, now: BootMs, vehicle: &Vehicle) -> Votes {
-        let mut votes = Votes::default();
-        let is_lost = self.is_lost(now, vehicle);
-        let heights = self.heights(now, vehicle, is_lost);
+        let heights = self.heights(now, vehicle);
         let (word, height) = (self.word(now, vehicle), self.height(now, heights));
+        let is_away = heights.iter().any(|vote| matches!(vote, Flies | Below));
+        let is_clear = is_away || (heights == [Unknown; 2] && word != Stands);
+        let mut votes = Votes { is_clear, ..Votes::default() };
         votes.take(WORD, word);
         votes.take(HEIGHT, height);
         if self.stage.is_mishap() && self.lies(now, vehicle) {
@@ -94,8 +97,8 @@ impl Flight {
             return votes;
         }
         // A hover is slow and still too.
-        let may_hover = (height == Flies || (word == Flies && are_away(heights))) && !self.is_supported(now);
-        let speed = self.speed(now, vehicle, is_lost, may_hover);
+        let may_hover = (height == Flies || (word == Flies && is_away)) && !self.is_supported(now);
+        let speed = self.speed(now, vehicle, may_hover);
         votes.take(THRUST, self.thrust_vote(now, vehicle, speed));
         votes.take(INERTIAL, self.inertial(now, vehicle, heights[0], may_hover));
         votes.take(SPEED, speed);
@@ -116,8 +119,8 @@ impl Flight {
         self.word(now, vehicle) == Stands
     }
 
-    fn heights(&self, now: BootMs, vehicle: &Vehicle, is_lost: bool) -> [Vote; 2] {
-        let by_position = self.motion.rise_m(now, vehicle).filter(|_| !is_lost);
+    fn heights(&self, now: BootMs, vehicle: &Vehicle) -> [Vote; 2] {
+        let by_position = self.motion.rise_m(now, vehicle).filter(|_| !self.lost_since.is_set());
         [(self.pressure.height_m(now), NOISE_M), (by_position, LOW_M)].map(|(height_m, low_m)| match height_m
         {
             None => Unknown,
@@ -140,10 +143,6 @@ impl Flight {
             [one, other] if one == other => one,
             _ => Undecided,
         }
-    }
-
-    pub(super) fn is_away(&self, now: BootMs, vehicle: &Vehicle) -> bool {
-        are_away(self.heights(now, vehicle, self.is_lost(now, vehicle)))
     }
 
     /// The effect of the throttle. `None` if it is not reported, or if it is reported as zero while motors shake the vehicle.
@@ -190,7 +189,7 @@ impl Flight {
         if rests || is_quiet || self.is_supported(now) { Stands } else { Undecided }
     }
 
-    fn speed(&self, now: BootMs, vehicle: &Vehicle, is_lost: bool, may_hover: bool) -> Vote {
+    fn speed(&self, now: BootMs, vehicle: &Vehicle, may_hover: bool) -> Vote {
         let power = self.power(now, vehicle);
         let climb_mps = climb_mps(now, vehicle);
         let ground_mps = ground_speed_mps(now, vehicle);
@@ -211,7 +210,7 @@ impl Flight {
                 Stands
             };
         }
-        if is_lost {
+        if self.lost_since.is_set() {
             return if self.has_strayed(now) { Stands } else { Unknown };
         }
         if ground_mps.or(climb_mps).is_none() || matches!(self.stage, Stage::Ground | Stage::Touched) {
@@ -236,17 +235,24 @@ impl Flight {
 
     /// Whether the estimate of height and speed is lost. The pressure does not follow a climb or a sink; or, in a
     /// mishap, the receiver stands.
-    fn is_lost(&self, now: BootMs, vehicle: &Vehicle) -> bool {
+    pub(super) fn loses_estimate(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let climbs = climb_mps(now, vehicle).filter(|climb_mps| climb_mps.abs() > LEVEL_MPS);
         self.has_strayed(now)
             || climbs.is_some_and(|climb_mps| self.pressure.follows(now, climb_mps) == Some(false))
+    }
+
+    /// Whether the estimator's attitude is a witness. The pressure contradicts it by the climb, the inertial sensors by the force. The
+    /// pressure follows a true fall within a second.
+    pub(crate) fn believes_attitude(&self, now: BootMs, vehicle: &Vehicle) -> bool {
+        !self.lost_since.older_than(now, TURNED) && !vehicle.inertial.contradicts(now)
     }
 
     fn has_strayed(&self, now: BootMs) -> bool {
         self.stage.is_mishap() && self.motion.has_strayed(now)
     }
 
-    /// Whether it lies on its side or its back: by an attitude that the sensors do not contradict, or by the force that carries it. Wings bank,
+    /// Whether it lies on its side or its back: by an attitude that the sensors do not contradict (the
+    /// impact itself may lose the estimate), or by the force that carries it. Wings bank,
     /// and tail-sitters look up.
     pub(super) fn lies(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let flies = vehicle.hovers(now) == Some(false) && is_fast(now, vehicle);
@@ -283,17 +289,13 @@ impl Flight {
         if let Some((since, _)) = self.supported
             && self.stage == Stage::Airborne
             && self.is_supported(now)
-            && self.is_lost(now, vehicle)
+            && self.lost_since.is_set()
             && (self.pressure.sank_at + TURNED).is_after(since)
         {
             self.hit_at = since;
             self.see(now, MishapKind::Impact, 0.0, params);
         }
     }
-}
-
-fn are_away(heights: [Vote; 2]) -> bool {
-    heights.iter().any(|vote| matches!(vote, Flies | Below))
 }
 
 pub(super) fn on_rotors(now: BootMs, vehicle: &Vehicle) -> bool {

@@ -36,7 +36,7 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) -> Option<Reading> {
-    let Inputs { now, vehicle, .. } = *inputs;
+    let Inputs { now, vehicle, flight, .. } = *inputs;
     if !matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Vtol) {
         return None;
     }
@@ -47,7 +47,7 @@ fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) ->
         let asked = is_made_to_turn(vehicle)
             || told.map_or_else(|| is_banked_by_hand(vehicle), |told| apart(is, told) < FOLLOWS_RAD);
         // No angle is too much on wings or in transition, and none counts that the sensors contradict.
-        let judged = vehicle.hovers(now) == Some(true) && !asked && !vehicle.inertial.contradicts(now);
+        let judged = vehicle.hovers(now) == Some(true) && !asked && flight.believes_attitude(now, vehicle);
         let angle_deg = is.to_degrees().abs();
         // Beyond it is overturned, which is a mishap.
         let judged = judged && angle_deg <= overturned_deg(inputs.params);
