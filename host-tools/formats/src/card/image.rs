@@ -115,8 +115,9 @@ fn is_zero(mut file: &File, mut at: u64) -> io::Result<bool> {
     }
 }
 
+/// First byte that is no hole, from `at` on.
 #[cfg(target_os = "linux")]
-fn data_from(file: &File, at: u64) -> io::Result<Option<u64>> {
+pub(crate) fn data_from(file: &File, at: u64) -> io::Result<Option<u64>> {
     match rustix::fs::seek(file, rustix::fs::SeekFrom::Data(at)) {
         Ok(data) => Ok(Some(data)),
         Err(rustix::io::Errno::NXIO) => Ok(None),
@@ -128,7 +129,7 @@ fn data_from(file: &File, at: u64) -> io::Result<Option<u64>> {
 
 #[cfg(not(target_os = "linux"))]
 #[expect(clippy::unnecessary_wraps, reason = "asking a system that tells may fail")]
-fn data_from(_: &File, at: u64) -> io::Result<Option<u64>> {
+pub(crate) fn data_from(_: &File, at: u64) -> io::Result<Option<u64>> {
     Ok(Some(at))
 }
 

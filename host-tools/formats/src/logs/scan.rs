@@ -4,20 +4,22 @@
 //! sectors are listed, others counted.
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use hums_blackbox::Header;
 
 use super::fat::Extent;
 use super::places::{BLOCK_BYTES, Log, LogBlocks, Piece};
 use super::sessions::first_session;
+use crate::card::image::data_from;
 use crate::progress;
 
 /// All sessions: 16 MiB. The recorder makes a segment in a few runs.
 const RUNS_MAX: usize = 1 << 20;
-/// Blocks between two looks at the bar.
-const BLOCKS_OF_BAR: u64 = 2_048;
+/// Between two looks at the bar.
+const STEP_BYTES: u64 = 1 << 20;
 /// Kept sessions.
 const SESSIONS_MAX: usize = 10_000;
 
@@ -116,22 +118,26 @@ impl Files {
 
 /// Skips sectors of `files`.
 pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
-    let everything = Piece { path: path.to_owned(), extents: vec![Extent { start: 0, length }] };
-    let all = Log { pieces: vec![everything], ..Log::default() };
-    let mut blocks: LogBlocks<'_> = all.blocks();
-    let mut sessions = Sessions::default();
+    let context = || format!("{}: cannot be read", path.display());
+    let file = File::open(path).with_context(context)?;
+    let (mut sessions, mut end) = (Sessions::default(), 0);
     // 128 GB take minutes.
     let bar = progress::bytes(Some(length), &format!("{}: looking at every block", path.display()));
-    let mut at: u64 = 0;
-    while let Some(block) = blocks.next_block()? {
-        if let Ok(header) = Header::read(block)
-            && !files.has(header.session, at)
-        {
-            sessions.sector(&header, at);
-        }
-        at += 1;
-        if at.is_multiple_of(BLOCKS_OF_BAR) {
-            bar.set_position(at * BLOCK_BYTES as u64);
+    // The holes of a sparse file have no sectors.
+    while let Some(data) = data_from(&file, end).with_context(context)?.filter(|data| *data < length) {
+        let start = data / STEP_BYTES * STEP_BYTES;
+        end = start + STEP_BYTES;
+        bar.set_position(start);
+        let extents = vec![Extent { start, length: STEP_BYTES.min(length - start) }];
+        let log = Log { pieces: vec![Piece { path: path.to_owned(), extents }], ..Log::default() };
+        let (mut blocks, mut at): (LogBlocks<'_>, u64) = (log.blocks(), start / BLOCK_BYTES as u64);
+        while let Some(block) = blocks.next_block()? {
+            if let Ok(header) = Header::read(block)
+                && !files.has(header.session, at)
+            {
+                sessions.sector(&header, at);
+            }
+            at += 1;
         }
     }
     bar.finish_and_clear();
@@ -165,7 +171,7 @@ pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
 
 #[cfg(test)]
 mod tests {
-    use std::io::Write as _;
+    use std::io::{Seek as _, SeekFrom, Write as _};
 
     use hums_blackbox::{SECTOR_BYTES, Sector};
 
@@ -183,6 +189,8 @@ mod tests {
     #[test]
     fn a_flight_is_found_among_more_sessions_than_are_kept_and_what_is_left_out_is_counted() {
         let mut file = tempfile::NamedTempFile::new().expect("a file");
+        let hole = 5 << 30;
+        file.seek(SeekFrom::Start(hole)).expect("a hole");
         let others = 3 * SESSIONS_MAX as u32;
         for session in 0..others {
             file.write_all(&sector(1_000_000 + session, 0)).expect("room");
@@ -190,11 +198,13 @@ mod tests {
                 (0..40).for_each(|number| file.write_all(&sector(7, number)).expect("room"));
             }
         }
-        let length = u64::from(others + 40) * 512;
+        let length = hole + u64::from(others + 40) * 512;
         let Scan { logs, left_out } = scan(file.path(), length, &Files::default()).expect("a file");
         assert_eq!(logs.len(), SESSIONS_MAX);
         assert_eq!(left_out, u64::from(others + 1) - SESSIONS_MAX as u64);
         let flight = logs.iter().find(|log| log.session == Some(7)).expect("the flight");
         assert_eq!(flight.bytes(), 40 * 512);
+        let start = hole + u64::from(others / 2 + 1) * 512;
+        assert_eq!(flight.pieces[0].extents, [Extent { start, length: 40 * 512 }]);
     }
 }
