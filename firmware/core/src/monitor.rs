@@ -140,7 +140,7 @@ impl Monitor {
         now: BootMs,
         link: &LinkReading,
         recorder: &RecorderStatus,
-        findings: &mut impl FnMut(&Finding),
+        findings: &mut dyn FnMut(&Finding),
     ) {
         self.ticked_at = now;
         let event = self.step_flight(now);

@@ -63,7 +63,7 @@ impl Health {
         &mut self,
         inputs: &Inputs<'_>,
         exceedances: &mut Exceedances,
-        findings: &mut impl FnMut(&Finding),
+        findings: &mut dyn FnMut(&Finding),
     ) {
         let hows = hows(inputs);
         let mut first = 0;
