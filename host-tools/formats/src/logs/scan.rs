@@ -189,6 +189,7 @@ mod tests {
     #[test]
     fn a_flight_is_found_among_more_sessions_than_are_kept_and_what_is_left_out_is_counted() {
         let mut file = tempfile::NamedTempFile::new().expect("a file");
+        // On Linux a hole, elsewhere 5 GiB.
         let hole = 5 << 30;
         file.seek(SeekFrom::Start(hole)).expect("a hole");
         let others = 3 * SESSIONS_MAX as u32;
