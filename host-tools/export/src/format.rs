@@ -307,9 +307,3 @@ impl Spool {
 }
 
 const NO_SPOOL: &str = "a temporary file cannot be written; TMPDIR names another folder for it";
-
-/// Number of lines in a text.
-pub fn lines_of(text: &[u8]) -> u64 {
-    // The last line end has no line after it.
-    text.split(|byte| *byte == b'\n').count() as u64 - 1
-}

@@ -24,10 +24,12 @@ impl<S: Source> Noisy<S> {
 impl<S: Source> Source for Noisy<S> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
         let Some(mut chunk) = self.inner.next()? else { return Ok(None) };
-        for byte in &mut chunk.bytes {
-            if self.rng.chance(self.probability) {
-                // Exclusive or with 1 to 255: it differs.
-                *byte ^= (self.rng.next_u64() % 255 + 1) as u8;
+        if self.probability > 0.0 {
+            for byte in &mut chunk.bytes {
+                if self.rng.chance(self.probability) {
+                    // Exclusive or with 1 to 255: it differs.
+                    *byte ^= (self.rng.next_u64() % 255 + 1) as u8;
+                }
             }
         }
         Ok(Some(chunk))
