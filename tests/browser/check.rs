@@ -618,7 +618,9 @@ fn a_program_that_stops_by_itself_or_lacks_memory_ends_with_a_sentence() {
 fn a_large_or_hostile_file_is_judged_as_on_the_command_line() {
     let mut page = Page::alone();
     let folder = page.dir.path().to_owned();
-    for log in [hostile::expanding(&folder), hostile::wide_ulog(&folder), hostile::texts(&folder, 100_000)] {
+    for log in
+        [hostile::expanding(&folder, 67), hostile::wide_ulog(&folder), hostile::texts(&folder, 100_000)]
+    {
         let name = log.file_name().unwrap().to_str().unwrap().to_owned();
         page.check("#files", std::slice::from_ref(&log));
         page.all_text();

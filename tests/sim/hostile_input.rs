@@ -8,10 +8,10 @@ use hums_tests::damage::Random;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::program::{Decoded, Machine, Recording, hums, hums_with};
 
-/// KiB, for any input.
-const MEMORY_KIB_MAX: u64 = 60 << 10;
+/// KiB, for the inputs here.
+const MEMORY_KIB_MAX: u64 = 40 << 10;
 /// Nearly all of it is a hole.
-const ENORMOUS: u64 = 70 << 20;
+const ENORMOUS: u64 = 42 << 20;
 
 fn readers(file: &Path, out: &Path) -> [Vec<String>; 3] {
     let (file, out) = (file.display().to_string(), out.display().to_string());

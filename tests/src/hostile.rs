@@ -209,7 +209,7 @@ pub fn long_arrays(dir: &Path) -> PathBuf {
     path
 }
 
-/// 72 MB and a minute: an attitude and a long text 20 times a second.
+/// 45 MB and 38 s: an attitude and a long text 20 times a second.
 pub fn long_ulog(dir: &Path) -> PathBuf {
     let mut text = vec![0; 60_000];
     text[..30_000].fill(b'x');
@@ -225,7 +225,7 @@ pub fn long_ulog(dir: &Path) -> PathBuf {
         message(log, b'F', &[b"words:uint64_t timestamp;char[60000] text;"]);
         message(log, b'A', &[&[0, 0, 0], b"vehicle_attitude"]);
         message(log, b'A', &[&[0, 1, 0], b"words"]);
-        for row in 0..1_200_u64 {
+        for row in 0..750_u64 {
             let at = (1_000_000 + row * 50_000).to_le_bytes();
             let level = [1_f32, 0.0, 0.0, row as f32 * 1e-6].map(f32::to_le_bytes).concat();
             message(log, b'D', &[&[0, 0], &at, &level]);
@@ -234,7 +234,7 @@ pub fn long_ulog(dir: &Path) -> PathBuf {
     })
 }
 
-/// 71 MB and twelve minutes: an attitude and 25 messages of three texts 20 times a second.
+/// 45 MB and seven minutes: an attitude and 25 messages of three texts 20 times a second.
 pub fn long_dataflash(dir: &Path) -> PathBuf {
     let mut texts = [0; 3 * 64];
     texts.chunks_mut(64).for_each(|text| text[..12].fill(b'x'));
@@ -243,7 +243,7 @@ pub fn long_dataflash(dir: &Path) -> PathBuf {
         write(&dataflash_format(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"));
         write(&dataflash_format(130, 3 + 8 + 12, "ATT", "Qfff", "TimeUS,Roll,Pitch,Yaw"));
         write(&dataflash_format(131, 3 + 8 + texts.len(), "WORD", "QZZZ", "TimeUS,A,B,C"));
-        for row in 0..14_000_u64 {
+        for row in 0..8_800_u64 {
             let at = 1_000_000 + row * 50_000;
             let level = [0.0, 0.0, row as f32 * 1e-3].map(f32::to_le_bytes).concat();
             write(&[&[0xa3, 0x95, 130], &at.to_le_bytes()[..], &level].concat());
@@ -262,21 +262,21 @@ fn long(dir: &Path, name: &str, write: impl FnOnce(&mut dyn Write)) -> PathBuf {
     path
 }
 
-/// `.gz` that expands 900-fold to 70 MB: heartbeats, zeros, heartbeats.
-pub fn expanding(dir: &Path) -> PathBuf {
+/// `.gz` that expands 900-fold to so many MiB: heartbeats, zeros, heartbeats.
+pub fn expanding(dir: &Path, mib: u64) -> PathBuf {
     let path = dir.join("expanding.raw.gz");
     let mut to = GzEncoder::new(File::create(&path).unwrap(), Compression::default());
     to.write_all(&HEARTBEAT.repeat(1_000)).unwrap();
-    for _ in 0..70 {
-        to.write_all(&vec![0; 1_000_000]).unwrap();
+    for _ in 0..mib {
+        to.write_all(&vec![0; 1 << 20]).unwrap();
     }
     to.write_all(&HEARTBEAT.repeat(1_000)).unwrap();
     to.finish().unwrap();
     path
 }
 
-/// A line of 80 MB.
-pub fn long_line(dir: &Path) -> PathBuf {
+/// A line of so many MiB.
+pub fn long_line(dir: &Path, mib: u64) -> PathBuf {
     long(dir, "line.log", |log| {
         log.write_all(b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n").unwrap();
         log.write_all(b"FMT, 129, 23, ATT, Qff, TimeUS,Roll,Pitch\n").unwrap();
@@ -284,8 +284,8 @@ pub fn long_line(dir: &Path) -> PathBuf {
             writeln!(log, "ATT, {}, 1.5, 2.0", second * 1_000_000).unwrap();
         }
         log.write_all(b"ATT, 30000000, 1.5, ").unwrap();
-        for _ in 0..80 {
-            log.write_all(&vec![b'1'; 1_000_000]).unwrap();
+        for _ in 0..mib {
+            log.write_all(&vec![b'1'; 1 << 20]).unwrap();
         }
     })
 }
