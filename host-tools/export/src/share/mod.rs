@@ -2,8 +2,8 @@
 //!
 //! * Frames of a link become a tlog with the fields in `fields.txt`, the parameters in `parameters.txt`, and texts made of the words in `words.txt`.
 //! * An autopilot's own log becomes a ULog of its observations, by the rules of `moved.rs`.
-//! * Places move so that the first one is in the middle of the Atlantic at sea level, pressure so that the first is standard pressure, and times so
-//!   that the first is the beginning of 2020. Relative motion, heights and durations stay.
+//! * Places move so that the first one is in the middle of the Atlantic, altitudes so that the first of each field is 0, pressure so that the
+//!   first is standard pressure, and times so that the first is the beginning of 2020. Relative motion, heights and durations stay.
 
 mod moved;
 mod rules;
@@ -192,7 +192,9 @@ impl Share {
         for place in &fields {
             let bytes = value(place);
             match place.rule {
-                Some(rule) => packet = packet.bytes(place.at, &self.moved.field(at, rule, place.kind, bytes)),
+                Some(rule) => {
+                    packet = packet.bytes(place.at, &self.moved.field(at, frame.id(), place, rule, bytes))
+                }
                 None if bytes.iter().any(|byte| *byte != 0) => self.remove(&format!("{name}.{}", place.name)),
                 None => {}
             }

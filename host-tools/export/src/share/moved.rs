@@ -1,11 +1,14 @@
-//! Places, times and pressures, moved by the same amount in the whole copy.
+//! Places, times and pressures, moved by the same amount in the whole copy; altitudes by the first one of each field.
+
+use std::collections::BTreeMap;
 
 use hums_core::clock::Instant;
 use hums_core::observation::{Air, GlobalPosition, Gnss, Hud, Observation};
 use hums_core::units::{Hectopascals, Metres, Position};
 use hums_dialect::Kind;
 
-use super::rules::Rule;
+use super::rules::{FieldRule, Rule};
+use crate::mavlink::ids::{GLOBAL_POSITION_INT, GPS_RAW_INT, VFR_HUD};
 
 /// The first time of each copy: 2020-01-01T00:00:00Z.
 pub(super) const SHARED_UTC_US: u64 = 1_577_836_800_000_000;
@@ -15,13 +18,16 @@ const SHARED: (f64, f64) = (45.0, -30.0);
 const SHARED_HPA: f64 = 1013.25;
 /// A step of UTC of at least this long is a clock that was set: an hour.
 const SET_US: u64 = 3_600_000_000;
+/// A step of an altitude of more metres is another reference: an estimator learns its height above sea level.
+const SET_M: f64 = 50.0;
 /// A time from here on is UTC in microseconds: 1973. An earlier one counts from power-on.
 const UTC_MIN_US: u64 = 100_000_000_000_000;
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Displacement {
     place: Option<(f64, f64)>,
-    altitude_m: Option<f64>,
+    /// By message and place in it: zero of the copy, and the last altitude, m.
+    altitudes: BTreeMap<(u32, usize), [f64; 2]>,
     pressure_hpa: Option<f64>,
     utc_us: Option<u64>,
 }
@@ -49,13 +55,18 @@ impl Displacement {
         })
     }
 
-    /// An altitude above sea level counts from that of the first place; before it there is none. Zero is none.
-    fn altitude(&mut self, metres: f64) -> f64 {
-        if self.place.is_none() || metres == 0.0 || !metres.is_finite() {
-            0.0
-        } else {
-            metres - *self.altitude_m.get_or_insert(metres)
+    /// An altitude above sea level counts from the first one of its field: fields have references of their own. A step begins anew,
+    /// because it would tell the height of the place. Zero is none.
+    fn altitude(&mut self, field: (u32, usize), metres: f64) -> f64 {
+        if metres == 0.0 || !metres.is_finite() {
+            return 0.0;
         }
+        let [zero, last] = self.altitudes.entry(field).or_insert([metres; 2]);
+        if (metres - *last).abs() > SET_M {
+            *zero = metres;
+        }
+        *last = metres;
+        metres - *zero
     }
 
     fn pressure(&mut self, hpa: f64) -> f64 {
@@ -74,7 +85,15 @@ impl Displacement {
     }
 
     /// A field's bytes, moved by its rule; zero if its type is not the rule's.
-    pub(super) fn field(&mut self, at: Instant, rule: Rule, kind: Kind, bytes: &[u8]) -> Vec<u8> {
+    pub(super) fn field(
+        &mut self,
+        at: Instant,
+        message: u32,
+        field: &FieldRule,
+        rule: Rule,
+        bytes: &[u8],
+    ) -> Vec<u8> {
+        let (kind, of) = (field.kind, (message, field.at));
         let degrees = |degrees: f64| ((degrees * 1e7).round() as i32).to_le_bytes().to_vec();
         let whole = || bytes.first_chunk().map_or(0, |bytes| i32::from_le_bytes(*bytes));
         let single = || bytes.first_chunk().map_or(0.0, |bytes| f64::from(f32::from_le_bytes(*bytes)));
@@ -91,9 +110,9 @@ impl Displacement {
             (Rule::Latitude, Kind::I32) => degrees(self.latitude(f64::from(whole()) / 1e7)),
             (Rule::Longitude, Kind::I32) => degrees(self.longitude(f64::from(whole()) / 1e7)),
             (Rule::Altitude, Kind::I32) => {
-                ((self.altitude(f64::from(whole()) / 1e3) * 1e3).round() as i32).to_le_bytes().to_vec()
+                ((self.altitude(of, f64::from(whole()) / 1e3) * 1e3).round() as i32).to_le_bytes().to_vec()
             }
-            (Rule::Altitude, Kind::F32) => (self.altitude(single()) as f32).to_le_bytes().to_vec(),
+            (Rule::Altitude, Kind::F32) => (self.altitude(of, single()) as f32).to_le_bytes().to_vec(),
             (Rule::Pressure, Kind::F32) => (self.pressure(single()) as f32).to_le_bytes().to_vec(),
             (Rule::Time, Kind::U64) => {
                 let us = bytes.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
@@ -112,8 +131,8 @@ impl Displacement {
         })
     }
 
-    fn metres(&mut self, altitude: Metres) -> Metres {
-        Metres(self.altitude(altitude.0.into()) as f32)
+    fn metres(&mut self, message: u32, altitude: Metres) -> Metres {
+        Metres(self.altitude((message, 0), altitude.0.into()) as f32)
     }
 
     fn air(&mut self, air: &Air) -> Air {
@@ -125,17 +144,18 @@ impl Displacement {
         Some(match observation {
             Observation::GlobalPosition(global) => Observation::GlobalPosition(GlobalPosition {
                 position: self.position(global.position),
-                altitude: self.metres(global.altitude),
+                altitude: self.metres(GLOBAL_POSITION_INT, global.altitude),
                 ..*global
             }),
             Observation::Gnss(gnss) => Observation::Gnss(Gnss {
                 position: self.position(gnss.position),
-                altitude: gnss.altitude.map(|altitude| self.metres(altitude)),
+                altitude: gnss.altitude.map(|altitude| self.metres(GPS_RAW_INT, altitude)),
                 measured_ms: None,
                 ..*gnss
             }),
             Observation::Hud(hud) => {
-                Observation::Hud(Hud { altitude: hud.altitude.map(|altitude| self.metres(altitude)), ..*hud })
+                let altitude = hud.altitude.map(|altitude| self.metres(VFR_HUD, altitude));
+                Observation::Hud(Hud { altitude, ..*hud })
             }
             Observation::Air(air) => Observation::Air(self.air(air)),
             Observation::ImuAndAir(imu, air) => Observation::ImuAndAir(*imu, self.air(air)),

@@ -1,7 +1,8 @@
 use std::fs;
 use std::path::Path;
 
-use hums_core::observation::Observation;
+use hums_core::observation::{Gnss, Hud, Observation};
+use hums_core::units::Metres;
 use hums_dialect::Kind;
 
 use super::*;
@@ -147,6 +148,27 @@ fn no_fact_of_any_message_is_in_the_copy_of_a_recording() {
     let (before, after) = (east_m(1e-3, PLACE.0), east_m(to.longitude_deg - from.longitude_deg, 45.0));
     assert!((before - after).abs() < 2e-7, "{before} {after}");
     assert_eq!((high - low, height), (20.0, 20.0));
+}
+
+/// An estimator that begins at 0 learns its height above sea level; the receiver knew it before.
+#[test]
+fn no_altitude_tells_the_height_of_the_place() {
+    let mut moved = Displacement::default();
+    for (altitude, expected) in [(1.0, 0.0), (1.5, 0.5), (603.0, 0.0), (605.0, 2.0), (555.5, -47.5)] {
+        let hud = |metres| Hud {
+            airspeed: None,
+            groundspeed: None,
+            heading_deg: None,
+            throttle: None,
+            altitude: Some(Metres(metres)),
+            climb: None,
+        };
+        let copy = moved.observation(&Observation::Hud(hud(altitude)));
+        assert_eq!(copy, Some(Observation::Hud(hud(expected))));
+    }
+    let gnss = Gnss { altitude: Some(Metres(588.0)), ..Gnss::default() };
+    let Some(Observation::Gnss(copy)) = moved.observation(&Observation::Gnss(gnss)) else { panic!("kept") };
+    assert_eq!(copy.altitude, Some(Metres(0.0)));
 }
 
 #[test]
