@@ -55,6 +55,29 @@ fn a_mere_copy_is_told_and_its_flight_counted_once() {
     assert!(said.contains("\n2 sessions: "), "{said}");
 }
 
+/// A shell's `*` names them beside their recordings.
+#[test]
+fn what_decode_made_is_passed_over_beside_its_recording_whatever_the_order_of_the_inputs() {
+    let dir = copied(1);
+    fs::copy(dir.path().join("copied/00001_00.HUM"), dir.path().join("b.hum")).expect("copied");
+    run(dir.path(), "decode b.hum -o made/ --format tlog,csv", 0);
+    let made = fs::read_dir(dir.path().join("made")).expect("made").map(|entry| entry.expect("read").path());
+    let made = made.into_iter().find(|path| path.extension().is_some_and(|ending| ending == "tlog"));
+    let made = made.expect("a tlog").strip_prefix(dir.path()).expect("inside").display().to_string();
+    fs::create_dir(dir.path().join("empty")).expect("made");
+    for inputs in [format!("b.hum {made}"), format!("{made} b.hum"), "made b.hum".to_owned()] {
+        let said = attempt(dir.path(), &format!("check {inputs}"));
+        let told = text(&said) + &stderr(&said);
+        assert!(told.contains("was made of b.hum, which is read, and is passed over"), "{inputs}: {told}");
+        // The last input has no recording, and is not the first to be missed.
+        let said = attempt(dir.path(), &format!("info --list {inputs} empty"));
+        let told = text(&said) + &stderr(&said);
+        assert!(said.status.code() == Some(1) && told.contains("empty: no log"), "{inputs}: {told}");
+    }
+    let said = stderr(&run(dir.path(), "decode b.hum empty -o again/ --format tlog", 1));
+    assert!(said.contains("instead of `*` name the folder"), "{said}");
+}
+
 #[test]
 fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alone() {
     let dir = copied(1);

@@ -124,7 +124,6 @@ impl FoundRecordings {
             let mut walk = Walk::of(input, &own)?;
             self.add_own(input, own);
             self.places.append(&mut walk.places);
-            self.drop_made();
             self.is_cut |= walk.left_out > 0;
             self.remarks.extend(walk.left_out_words(input));
             self.is_cut |= walk.unknown > 0;
@@ -270,7 +269,8 @@ impl FoundRecordings {
 /// Files, folders, cards, images, `-`. Named inputs must be recordings; others in a folder are passed over.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundRecordings> {
     let mut found = find_each(inputs, salvage)?;
-    found.failed.pop().map_or(Ok(found), |(_, error)| Err(error))
+    let Some((_, error)) = found.failed.pop() else { return Ok(found) };
+    bail!("{error:#}; instead of `*` name the folder: what is no recording is passed over in it")
 }
 
 /// As [`find`], but one of several inputs without a recording keeps no other from being read.
@@ -286,6 +286,7 @@ pub fn find_each(inputs: &[PathBuf], salvage: bool) -> Result<FoundRecordings> {
             added => added?,
         }
     }
+    found.drop_made();
     found.drop_copies();
     make_unique(found.places.iter_mut().map(|place| &mut place.name));
     Ok(found)
