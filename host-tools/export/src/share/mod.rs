@@ -193,7 +193,7 @@ impl Share {
             let bytes = value(place);
             match place.rule {
                 Some(rule) => {
-                    packet = packet.bytes(place.at, &self.moved.field(at, frame.id(), place, rule, bytes))
+                    packet = packet.bytes(place.at, &self.moved.field(at, frame.id(), place, rule, bytes));
                 }
                 None if bytes.iter().any(|byte| *byte != 0) => self.remove(&format!("{name}.{}", place.name)),
                 None => {}
