@@ -161,7 +161,7 @@ impl Release {
     }
 
     fn check_page(&self) -> Result<File> {
-        let [command, arguments @ ..] = browser::SHIPPED;
+        let [command, arguments @ ..] = browser::arguments(browser::SHIPPED);
         self.cargo(command, &arguments, hums_boards::DEFAULT)?;
         let page = self.target().join("hums-check.html");
         let run = ["--release", "--quiet", "--package=hums-browser", "--bin=hums-check-page", "--"];

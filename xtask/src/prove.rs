@@ -82,7 +82,7 @@ fn chip(boards: &[&'static Board], names: &[String]) -> Result<()> {
 fn in_browsers() -> Result<()> {
     setup::require(&[Need::Linker, Need::BrowserTarget, Need::PythonVenv, Need::Chromium, Need::Firefox])?;
     hums::build_release()?;
-    browser::build_shipped()?;
+    browser::build(browser::SHIPPED)?;
     oracle::prepare()?;
     pc::build()?;
     pc::end_to_end_with(&browser::shipped(&repo::target()), &["--ignored", "--nocapture", "browser::"])

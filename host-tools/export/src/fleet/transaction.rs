@@ -166,7 +166,7 @@ impl Transaction {
         // The lock is held before it has its name, so no other program removes the folder.
         let new = part.path().join("new");
         let held = settle(File::create_new(&new), root)?;
-        // Without locks of the file system, nobody removes its folder.
+        // On a file system without locks the folder gets no lock file, and no program removes the folder.
         if held.lock().is_ok() {
             settle(fs::rename(new, part.path().join(LOCK)), root)?;
         }
