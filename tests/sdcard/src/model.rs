@@ -131,17 +131,11 @@ pub(crate) fn crc7(bytes: &[u8]) -> u8 {
     crc << 1 | 1
 }
 
-/// As [`crc7`].
+/// The polynomial x^16 + x^12 + x^5 + 1 for each byte at once.
 pub(crate) fn crc16(bytes: &[u8]) -> u16 {
-    let mut crc = 0_u16;
-    for byte in bytes {
-        for bit in (0..8).rev() {
-            let carry = (crc >> 15) as u8 ^ (byte >> bit) & 1;
-            crc <<= 1;
-            if carry & 1 == 1 {
-                crc ^= 0x1021;
-            }
-        }
-    }
-    crc
+    bytes.iter().fold(0_u16, |crc, byte| {
+        let high = (crc >> 8) ^ u16::from(*byte);
+        let high = high ^ high >> 4;
+        crc << 8 ^ high << 12 ^ high << 5 ^ high
+    })
 }

@@ -36,6 +36,8 @@ struct Inner {
     card: Option<SdCard>,
     now_ns: u64,
     hz: u32,
+    /// Of one byte.
+    byte_ns: u64,
     selected: bool,
     counts: Counts,
     at_time: Vec<(u64, Event)>,
@@ -58,6 +60,7 @@ impl Slot {
             card: card.map(SdCard::new),
             now_ns: SdCard::POWER_UP_NS,
             hz: 0,
+            byte_ns: 8_000_000_000,
             selected: false,
             counts: Counts::default(),
             at_time: Vec::new(),
@@ -176,7 +179,7 @@ impl Inner {
 
     fn exchange(&mut self, sent: u8) -> u8 {
         self.happen_what_is_due();
-        self.now_ns += 8_000_000_000 / u64::from(self.hz.max(1));
+        self.now_ns += self.byte_ns;
         if self.stop_at.is_some_and(|at| self.counts.bytes >= at) {
             return 0xFF;
         }
@@ -229,10 +232,12 @@ impl Port for SimPort {
     }
 
     fn set_clock(&mut self, clock: Clock) {
-        self.slot.0.borrow_mut().hz = match clock {
+        let mut inner = self.slot.0.borrow_mut();
+        inner.hz = match clock {
             Clock::Identification => 328_125,
             Clock::Transfer => self.transfer_hz,
         };
+        inner.byte_ns = 8_000_000_000 / u64::from(inner.hz);
     }
 
     fn now(&self) -> Instant {

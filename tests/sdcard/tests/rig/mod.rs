@@ -18,7 +18,8 @@ use hums_link::request::Port;
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX, Queues};
 use hums_onboard::storage::{self, NO_CARD_RETRY};
 use hums_onboard::{Monitoring, PortStatus, ResetCause, Service, Supervisor, Task};
-use hums_recorder::{BLOCK_BYTES, Buffers, Card, CardState, CardStatus, LogName, Recorder, SpiCard};
+use hums_recorder::card::{LogEntry, Segment};
+use hums_recorder::{BLOCK_BYTES, Buffers, Card, CardState, CardStatus, Recorder, SpiCard};
 use hums_sdcard::{MS, Medium, Model, SimPort, Slot};
 use log::Item;
 
@@ -322,15 +323,15 @@ pub fn read(medium: &Medium) -> Found {
     let (status, held) = (CardStatus::new(), Buffers::new());
     let mounted = Card::mount(medium, &status, &held);
     let card = mounted.map_err(|error| error.to_string()).expect("the card is in order");
-    let mut sessions: BTreeMap<u32, Vec<LogName>> = BTreeMap::new();
-    card.logs(|log| sessions.entry(log.name.session).or_default().push(log.name)).expect("it lists");
+    let mut sessions: BTreeMap<u32, Vec<LogEntry>> = BTreeMap::new();
+    card.logs(|log| sessions.entry(log.name.session).or_default().push(log)).expect("it lists");
     let mut found = Found { sessions: sessions.len(), ..Found::default() };
-    for mut names in sessions.into_values() {
-        names.sort_unstable();
-        found.segments += names.len();
+    for mut logs in sessions.into_values() {
+        logs.sort_unstable_by_key(|log| log.name);
+        found.segments += logs.len();
         let mut blocks = Vec::new();
-        for name in names {
-            let mut segment = card.segment(name).expect("it is there");
+        for log in logs {
+            let mut segment = Segment::of(&log);
             // The newest copy of the last sector may be at the place after it.
             let mut empty = 0;
             for index in 0..segment.blocks() {
