@@ -32,10 +32,11 @@ const TABLES: [&str; 10] = [
 fn compare(log: &Path, code: i32) -> (usize, usize) {
     let ours = Decoded::of(log, &[code]);
     let [ours] = ours.tlogs() else { panic!("{} logs", ours.tlogs().len()) };
-    let theirs = oracle::second_decoder(log, "tlog");
-    assert!(*ours == theirs, "{} and {} bytes of tlog", ours.len(), theirs.len());
-
-    let theirs = rows(&oracle::second_decoder(log, "jsonl"));
+    let dir = tempfile::tempdir().unwrap();
+    let tlog = dir.path().join("their.tlog");
+    let theirs = rows(&oracle::second_decoder(log, &tlog));
+    let tlog = fs::read(tlog).unwrap();
+    assert!(*ours == tlog, "{} and {} bytes of tlog", ours.len(), tlog.len());
     let frames = theirs.iter().filter(|row| row["frame"].is_string()).count();
     let mut decode = command(["decode".as_ref(), log.as_os_str()]);
     let text = child::run(decode.args(["--format", "jsonl", "-o", "-"]), LIMIT).expect_code(&[code]).stdout;

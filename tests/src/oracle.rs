@@ -36,8 +36,8 @@ fn outcome(script: &str, arguments: &[PathBuf]) -> child::Outcome {
 fn command(script: &str, arguments: &[PathBuf]) -> Command {
     let mut command = Command::new(beside_python("python"));
     command.arg(root().join("tests/oracle").join(script)).args(arguments);
-    // No compiled scripts in the repository.
-    command.env("PYTHONDONTWRITEBYTECODE", "1");
+    // Compiled once, the dialect's 3 MB above all; and not into the repository.
+    command.env_remove("PYTHONDONTWRITEBYTECODE").env("PYTHONPYCACHEPREFIX", beside_python("compiled"));
     command
 }
 
@@ -77,9 +77,9 @@ pub fn ulog(log: &Path, folder: &Path) -> Value {
     json(&run("ulog.py", &[log.to_owned(), folder.to_owned()]))
 }
 
-/// A decoder by the format document alone: `tests/oracle/hums_log`.
-pub fn second_decoder(log: &Path, format: &str) -> Vec<u8> {
-    outcome("hums_log", &[PathBuf::from("--format"), PathBuf::from(format), log.to_owned()]).stdout
+/// A decoder by the format document alone, `tests/oracle/hums_log`: the lines of JSON; the tlog goes into `tlog`.
+pub fn second_decoder(log: &Path, tlog: &Path) -> Vec<u8> {
+    outcome("hums_log", &[log.to_owned(), tlog.to_owned()]).stdout
 }
 
 /// A line of JSON for each message: `tests/oracle/dataflash.py`.
@@ -126,10 +126,9 @@ struct Browser {
 
 impl Browser {
     fn start() -> Self {
-        let mut command = Command::new(from_environment("HUMS_PYTHON", "target/venv/bin/python"));
-        command.arg(root().join("tests/oracle/live.py")).env("PYTHONDONTWRITEBYTECODE", "1");
-        command.arg(program("HUMS_CHROMIUM", "/usr/bin/chromium"));
-        command.arg(program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver"));
+        let programs =
+            [("HUMS_CHROMIUM", "/usr/bin/chromium"), ("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver")];
+        let mut command = command("live.py", &programs.map(|(variable, path)| program(variable, path)));
         let mut script = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("python runs");
         let asked = script.stdin.take().expect("it is piped");
         let answers = BufReader::new(script.stdout.take().expect("it is piped")).lines();
