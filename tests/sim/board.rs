@@ -3,6 +3,7 @@
 
 use std::ffi::OsStr;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -31,7 +32,12 @@ impl Board {
     pub(crate) fn start_with(input: &OsStr, dir: TempDir, flags: &[&str]) -> Self {
         let port = free_port();
         let mut command: Command = program::command(["sim", "--json", "--speed", "real"]);
-        command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
+        let image = dir.path().join("card.img");
+        if !image.exists() {
+            // Tests read all of it.
+            command.args(["--card-size", "64"]);
+        }
+        command.arg(input).arg("--sd").arg(image);
         command.args(["--gs", &format!("udpin:127.0.0.1:{port}")]).args(flags);
         let child = command.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
         Self { dir: Some(dir), child, port }
@@ -62,6 +68,18 @@ impl Drop for Board {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// One finished session: this part of a recording, and parameters. All such cards have logs of the same names.
+pub(crate) fn card(part: Range<usize>, seed: &str) -> (TempDir, Vec<u8>) {
+    let dir = tempfile::tempdir().unwrap();
+    let recording = fs::read(own("ap_quad_signed.raw")).unwrap();
+    let (input, image) = (dir.path().join("short.raw"), dir.path().join("card.img"));
+    fs::write(&input, &recording[part]).unwrap();
+    fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
+    hums_with("sim --card-size 64 --seed {} {} --sd {}", &[&seed, &input, &image]).expect_code(&[0]);
+    let card = fs::read(&image).unwrap();
+    (dir, card)
 }
 
 #[track_caller]

@@ -57,7 +57,7 @@ fn chunks(recording: &Path, mut ask: impl FnMut(u64) -> Vec<u8>) -> Vec<(Side, C
 
 fn power_on(recording: &Path, budget: u32, ask: impl FnMut(u64) -> Vec<u8>) -> (Outcome, Vec<Sent>) {
     let dir = tempfile::tempdir().unwrap();
-    let file = image::open_or_make(&dir.path().join("card.img"), Some(256), |_| Ok(())).unwrap();
+    let file = image::open_or_make(&dir.path().join("card.img"), Some(64), |_| Ok(())).unwrap();
     let card = SimCard::new(file, Faults::default()).unwrap();
     hums_recorder::format::format(&card, 7).unwrap();
     let mut params = Params::defaults();

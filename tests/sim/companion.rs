@@ -11,13 +11,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
+use hums_tests::fat::drive;
 use hums_tests::flights::{own, root};
 use hums_tests::oracle;
 use hums_tests::program::{hums, hums_with};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::board::{Board, assert_on_card, pulled_log};
+use super::board::{Board, assert_on_card, card, pulled_log};
 
 #[test]
 fn a_ground_station_lists_reads_sets_and_commands() {
@@ -120,7 +121,7 @@ fn statistic(dir: &TempDir, name: &str) -> Vec<u64> {
 }
 
 fn between_autopilot_and_ground_station(kind: &str) -> (Value, TempDir) {
-    let (dir, _) = card_with_a_log();
+    let (dir, _) = card(0..80_000, "1");
     let params = dir.path().join("params.txt");
     fs::write(&params, "GS_BUDGET 5000\nGS_PASS 1\n").unwrap();
     let autopilot = hums_tests::live::free_port();
@@ -175,7 +176,7 @@ fn an_ardupilot_that_knows_no_intervals_is_asked_for_groups_and_its_radio_is_sha
 
 #[test]
 fn mavproxy_lists_sets_downloads_and_signs() {
-    let (dir, card) = card_with_a_log();
+    let (dir, card) = card(0..80_000, "1");
     let params = dir.path().join("params.txt");
     fs::write(&params, "GS_BUDGET 5000\nSIGN_PORT 1\nGS_SIGN 2\n").unwrap();
     let folder = dir.path().join("mavproxy");
@@ -246,10 +247,8 @@ fn mavproxy_shows_what_the_box_says_with_the_module_and_nothing_without_it() {
 fn put_parameters(image: &Path, lines: &str) {
     let text = image.with_file_name("PARAMS.TXT");
     fs::write(&text, lines).unwrap();
-    let card = fs::read(image).unwrap();
-    let start = u32::from_le_bytes(card[454..458].try_into().unwrap()) * 512;
-    let drive = format!("{}@@{start}", image.display());
-    let copied = Command::new("mcopy").args(["-i", &drive]).arg(&text).arg("::PARAMS.TXT").status().unwrap();
+    let copied =
+        Command::new("mcopy").args(["-i", &drive(image)]).arg(&text).arg("::PARAMS.TXT").status().unwrap();
     assert!(copied.success());
 }
 
@@ -364,20 +363,9 @@ impl Drop for Lossy {
     }
 }
 
-fn card_with_a_log() -> (TempDir, Vec<u8>) {
-    let dir = tempfile::tempdir().unwrap();
-    let recording = fs::read(own("ap_quad_signed.raw")).unwrap();
-    fs::write(dir.path().join("short.raw"), &recording[..80_000]).unwrap();
-    fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
-    let (input, image) = (dir.path().join("short.raw"), dir.path().join("card.img"));
-    hums_with("sim {} --sd {}", &[&input, &image]).expect_code(&[0]);
-    let card = fs::read(&image).unwrap();
-    (dir, card)
-}
-
 #[test]
 fn a_log_pulled_over_a_link_that_loses_a_tenth_is_the_one_on_the_card() {
-    let (dir, card) = card_with_a_log();
+    let (dir, card) = card(0..80_000, "1");
     let params = dir.path().join("params.txt").display().to_string();
     let (pulled, downloaded) = (dir.path().join("pulled"), dir.path().join("downloaded"));
     let board = Board::start_in(dir, &["--params", &params]);

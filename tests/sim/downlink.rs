@@ -30,7 +30,7 @@ fn the_stream_of_each_flight_parses_without_one_bad_frame() {
 
 #[test]
 fn the_box_tells_how_it_is_doing_as_an_onboard_computer() {
-    let recording = Recording::make(Machine::Sim, &own("ap_quad_guided.tlog"), &[]);
+    let recording = Recording::make(Machine::Sim, &own("ap_quad_guided.tlog"), &["--card-size", "256"]);
     let stream = oracle::ground_station(&recording.gs());
     let told = &stream["computer"];
     let seconds = told["uptime"].as_u64().unwrap() / 1_000;

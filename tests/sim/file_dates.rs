@@ -4,15 +4,13 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use hums_tests::fat::drive;
 use hums_tests::flights::own;
 use hums_tests::program::{hums, hums_with};
 
 /// `mdir`: name and date.
 fn dates(image: &Path) -> Vec<(String, String)> {
-    let card = fs::read(image).unwrap();
-    let start = u32::from_le_bytes(card[454..458].try_into().unwrap()) * 512;
-    let drive = format!("{}@@{start}", image.display());
-    let listed = Command::new("mdir").args(["-i", &drive, "-a", "::"]).output().unwrap();
+    let listed = Command::new("mdir").args(["-i", &drive(image), "-a", "::"]).output().unwrap();
     assert!(listed.status.success(), "{}", String::from_utf8_lossy(&listed.stderr));
     let text = String::from_utf8(listed.stdout).unwrap();
     let logs = text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());

@@ -11,24 +11,10 @@ use hums_tests::live::Running;
 use hums_tests::program::{command, hums};
 use tempfile::TempDir;
 
-use super::board::{Board, assert_on_card, pulled_log, pulled_logs};
+use super::board::{Board, assert_on_card, card, pulled_log, pulled_logs};
 
 const LOG: &str = "00001_00.HUM";
 const NUMBER: &str = "00001";
-
-/// One finished session: this part of a recording. All such cards have logs of the same names.
-fn card(part: std::ops::Range<usize>, seed: &str) -> (TempDir, Vec<u8>) {
-    let dir = tempfile::tempdir().unwrap();
-    let recording = fs::read(own("ap_quad_signed.raw")).unwrap();
-    let (input, image) = (dir.path().join("short.raw"), dir.path().join("card.img"));
-    fs::write(&input, &recording[part]).unwrap();
-    fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
-    let mut sim = command(["sim", "--seed", seed]);
-    sim.arg(&input).arg("--sd").arg(&image);
-    hums_tests::child::run(&mut sim, Duration::from_mins(1)).expect_code(&[0]);
-    let card = fs::read(&image).unwrap();
-    (dir, card)
-}
 
 fn board(dir: TempDir) -> Board {
     let params = dir.path().join("params.txt").display().to_string();
@@ -213,7 +199,7 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     // The autopilot's failsafe at 35 s is in the log's second group.
     fs::write(&input, cut(&fs::read(own("ap_quad_faults.tlog")).unwrap(), 232, 272)).unwrap();
     fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
-    let mut sim = command(["sim"]);
+    let mut sim = command(["sim", "--card-size", "64"]);
     sim.arg(&input).arg("--sd").arg(&image);
     hums_tests::child::run(&mut sim, Duration::from_mins(1)).expect_code(&[0]);
     let card = fs::read(&image).unwrap();

@@ -33,7 +33,7 @@ struct Said {
 
 fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let dir = tempfile::tempdir().unwrap();
-    let file = image::open_or_make(&dir.path().join("card.img"), Some(256), |_| Ok(())).unwrap();
+    let file = image::open_or_make(&dir.path().join("card.img"), Some(64), |_| Ok(())).unwrap();
     let card = SimCard::new(file, Faults::default()).unwrap();
     hums_recorder::format::format(&card, 7).unwrap();
     let params = Params::defaults();

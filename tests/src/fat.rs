@@ -51,14 +51,22 @@ pub fn complaints(partition: &Path) -> Vec<String> {
     odd
 }
 
+/// The card's file system for mtools.
+///
+/// # Panics
+/// It has no partition.
+pub fn drive(image: &Path) -> String {
+    let (start, _) = partition(&mut File::open(image).unwrap());
+    format!("{}@@{start}", image.display())
+}
+
 /// Copies the card's files with mtools.
 ///
 /// # Panics
 #[track_caller]
 pub fn copy_files(image: &Path, folder: &Path) {
-    let (start, _) = partition(&mut File::open(image).unwrap());
     let mut command = Command::new("mcopy");
-    command.args(["-s", "-n", "-i"]).arg(format!("{}@@{start}", image.display())).arg("::/").arg(folder);
+    command.args(["-s", "-n", "-i", &drive(image)]).arg("::/").arg(folder);
     let outcome = child::run(&mut command, Duration::from_mins(1));
     assert_eq!(outcome.code, Some(0), "mcopy: {}", outcome.stderr);
 }

@@ -130,7 +130,8 @@ impl Recording {
             Machine::Sim => LIMIT,
             Machine::Chip => LIMIT_CHIP,
         };
-        let mut command = command(["sim", "--json"]);
+        // Tests read all of the card.
+        let mut command = command(["sim", "--json", "--card-size", "64"]);
         command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
         command.arg("--gs").arg(dir.path().join("gs.bin")).args(flags);
         match machine {
