@@ -162,7 +162,7 @@ pub fn wide_ulog(dir: &Path) -> PathBuf {
         for topic in 0..TOPICS {
             message(&mut log, b'A', &[&[0][..], &topic.to_le_bytes(), name(topic).as_bytes()].concat());
         }
-        for row in 0..40_u64 {
+        for row in 0..20_u64 {
             for topic in 0..TOPICS {
                 let at = 1_000_000 + row * 100_000 + u64::from(topic);
                 let data = [&topic.to_le_bytes()[..], &at.to_le_bytes(), &[row as u8; FIELDS]].concat();
