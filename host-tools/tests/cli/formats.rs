@@ -8,7 +8,7 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::Field;
 use tempfile::TempDir;
 
-use super::support::{flight, named, run, stderr, text};
+use super::support::{end_of, flight, named, run, stderr, text};
 
 /// The text on both output streams.
 #[track_caller]
@@ -22,9 +22,13 @@ fn read(path: &Path) -> SerializedFileReader<File> {
 }
 
 fn packed(names: &[&str]) -> TempDir {
-    let dir = tempfile::tempdir().expect("a directory");
+    packed_from(names, |name, _| flight(name))
+}
+
+fn packed_from(names: &[&str], from: fn(&str, &Path) -> PathBuf) -> TempDir {
+    let (dir, made) = [(); 2].map(|()| tempfile::tempdir().expect("a directory")).into();
     for name in names {
-        let (from, stem) = (flight(name), name.split('.').next().unwrap_or(name));
+        let (from, stem) = (from(name, made.path()), name.split('.').next().unwrap_or(name));
         hums(dir.path(), &format!("decode --format hum {} -o {stem}.hum", from.display()), 0);
     }
     dir
@@ -156,36 +160,14 @@ fn point(line: &str) -> (String, BTreeMap<String, String>, BTreeMap<String, Stri
 
 #[test]
 fn the_reference_systems_field_names_are_kept_for_both_autopilots() {
-    const BOTH: [&str; 23] = [
-        "Flight Time",
-        "Battery (%)",
-        "Battery (V)",
-        "Temp",
-        "Air Pressure",
-        "Front Accel",
-        "Right Accel",
-        "Down Accel",
-        "Accel Module",
-        "North Velocity",
-        "East Velocity",
-        "Down Velocity",
-        "Velocity Module",
-        "Velocity",
-        "Altitude",
-        "Latitude",
-        "Longitude",
-        "Throttle (%)",
-        "Climb Rate (m/s)",
-        "groundspeed",
-        "heading",
-        "esc_rpm0",
-        "esc_voltage3",
-    ];
+    const BOTH: &str = "Flight Time|Battery (%)|Battery (V)|Temp|Air Pressure|Front Accel|Right Accel|Down Accel|\
+        Accel Module|North Velocity|East Velocity|Down Velocity|Velocity Module|Velocity|Altitude|\
+        Latitude|Longitude|Throttle (%)|Climb Rate (m/s)|groundspeed|heading|esc_rpm0|esc_voltage3";
     for (name, own) in [
         ("px4_hil_quad_low.tlog", &["esc_fail0", "esc3_fails", "esc_temperature2", "esc_current1"][..]),
         ("ap_quad_guided.tlog", &["Air Speed (m/s)", "esc_current3"]),
     ] {
-        let dir = packed(&[name]);
+        let dir = packed_from(&[name], end_of);
         let stem = name.split('.').next().expect("a stem");
         hums(dir.path(), &format!("decode {stem}.hum -o out.lp --format influx"), 0);
         let text = fs::read_to_string(dir.path().join("out.lp")).expect("points");
@@ -198,8 +180,8 @@ fn the_reference_systems_field_names_are_kept_for_both_autopilots() {
             }
             assert!(times.insert((measurement, tags, time)), "a point would replace another: {line}");
         }
-        for field in BOTH.iter().chain(own) {
-            assert!(seen.contains(*field), "{name}: {field} is not in {seen:?}");
+        for field in BOTH.split('|').chain(own.iter().copied()) {
+            assert!(seen.contains(field), "{name}: {field} is not in {seen:?}");
         }
     }
 }
@@ -281,7 +263,7 @@ fn subtitles_begin_with_the_video_and_a_format_says_what_it_leaves_out() {
 
 #[test]
 fn several_logs_side_by_side_are_what_each_is_alone() {
-    let dir = packed(&["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"]);
+    let dir = packed_from(&["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"], end_of);
     fs::copy(dir.path().join("px4_hil_quad_low.hum"), dir.path().join("zz_again.hum")).expect("copied");
     let said = hums(dir.path(), "decode . -o all --format csv,influx,parquet", 0);
     assert!(said.contains("zz_again: is a copy of px4_hil_quad_low (not counted)"), "{said}");

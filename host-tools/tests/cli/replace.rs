@@ -357,7 +357,8 @@ fn recordings_are_once_in_a_fleet_however_often_their_folders_are_decoded() {
     ] {
         fs::rename(end_of(name, dir.path()), to(path)).expect("moved");
     }
-    fs::copy(flight("ap_quad_signed.raw"), to("quad/c.raw")).expect("a copy");
+    let raw = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
+    fs::write(to("quad/c.raw"), &raw[..400_000]).expect("written");
     fs::copy(to("quad/a.tlog"), to("spare/again.tlog")).expect("a copy");
     let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
     packed.write_all(&fs::read(to("quad/b.tlog")).expect("a recording")).expect("packed");
@@ -370,7 +371,7 @@ fn recordings_are_once_in_a_fleet_however_often_their_folders_are_decoded() {
         (ended.status.code(), told)
     };
     let mut known = Vec::new();
-    for round in 0..3 {
+    for round in 0..2 {
         let (code, told) = decode("logs", "");
         assert_eq!(
             (code, told.contains("skipped: 4 sessions are there already")),
