@@ -242,9 +242,9 @@ fn position_of_gnss(state: &mut State, given: &Given<'_>, gnss: &Gnss, out: &mut
     if let Some([speed, course]) = given.singles(7) {
         let (east, north) = course.to_radians().sin_cos();
         let of_barometer = || state.climb.within(given.at, TOGETHER);
-        let climb = || state.told_climb.within(given.at, TOGETHER).or_else(of_barometer);
-        let down = given.single(9).or_else(|| climb().map(|climb| -climb)).unwrap_or(0.0);
-        state.receiver_velocity.set(given.at, [speed * north, speed * east, down]);
+        let of_receiver = || given.single(9).map(|down| -down);
+        let climb = state.told_climb.within(given.at, TOGETHER).or_else(of_receiver).or_else(of_barometer);
+        state.receiver_velocity.set(given.at, [speed * north, speed * east, -climb.unwrap_or(0.0)]);
     }
 }
 

@@ -493,25 +493,24 @@ fn a_text_log_of_2013_without_any_clock_but_the_receivers_is_read() {
     let log = "\n1\n\nArduCopter V3.0.1\nFree RAM: 1696\n\
         FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\n\
         FMT, 129, 23, PARM, Nf, Name,Value\n\
-        FMT, 130, 35, GPS, BIBcLLeeEe, Status,Time,NSats,HDop,Lat,Lng,RelAlt,Alt,Spd,GCrs\n\
+        FMT, 130, 35, GPS, BIBcLLeeEef, Status,Time,NSats,HDop,Lat,Lng,RelAlt,Alt,Spd,GCrs,VZ\n\
         FMT, 1, 17, ATT, cccccCC, RollIn,Roll,PitchIn,Pitch,YawIn,Yaw,NavYaw\n\
-        FMT, 3, 6, MODE, Mh, Mode,ThrCrs\n\
-        PARM, RC1_MIN, 1100.000000\n\
-        MODE, STABILIZE, 350\n\
-        GPS, 3, 594438200, 9, 1.68, 44.0290459, -77.7367640, 3.13, 91.56, 0.00, 0.00\n\
+        FMT, 3, 6, MODE, Mh, Mode,ThrCrs\nFMT, 4, 7, CTUN, hh, ThrOut,CRate\n\
+        PARM, RC1_MIN, 1100.000000\nMODE, STABILIZE, 350\nCTUN, 400, 250\n\
+        GPS, 3, 594438200, 9, 1.68, 44.0290459, -77.7367640, 3.13, 91.56, 0.00, 0.00, -0.5\n\
         ATT, 0.00, 0.47, 0.00, -8.53, 0.00, 111.24, 111.24\n\
         NOPE, 1\n\
-        GPS, 3, 594439400, 9, 1.68, 44.0290459, -77.7367640, 5.13, 93.56, 0.00, 0.00\n\
+        GPS, 3, 594439400, 9, 1.68, 44.0290459, -77.7367640, 5.13, 93.56, 0.00, 0.00, -0.5\n\
         ATT, 0.00, 90.00";
     let seen = seen(log.as_bytes());
     assert_eq!(seen.last.as_millis(), 1_200);
     assert!(seen.said.contains(&"Firmware: ArduCopter V3.0.1".to_owned()), "{:?}", seen.said);
     assert!(seen.said.contains(&"STABILIZE".to_owned()) && seen.said.contains(&"RC1_MIN=1100".to_owned()));
     let heights = seen.find(|seen| match seen {
-        Observation::GlobalPosition(position) => Some(position.relative_altitude.0),
+        Observation::GlobalPosition(position) => Some([position.relative_altitude.0, position.velocity[2].0]),
         _ => None,
     });
-    assert_eq!(heights, [3.13, 5.13]);
+    assert_eq!(heights, [[3.13, 0.0], [5.13, -2.5]], "not the climb of the receiver");
     let attitude = seen.find(|seen| match seen {
         Observation::Attitude(attitude) => Some((attitude.roll.0.to_degrees(), attitude.boot_ms)),
         _ => None,
