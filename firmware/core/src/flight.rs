@@ -150,6 +150,8 @@ struct Arming {
     seen_off: bool,
     /// It was level since the arming.
     stood: bool,
+    /// It was in the air since the arming.
+    flew: bool,
     /// A sign outside of a flight was reported since the arming.
     on_bench: bool,
 }
@@ -247,6 +249,11 @@ impl Flight {
         self.seen_on_ground && !self.is_open()
     }
 
+    /// Whether it has stood level since it was armed, neither in the air nor turned over.
+    pub(crate) fn stayed(&self) -> bool {
+        self.arming.stood && !self.arming.flew && self.tilted_at.is_none()
+    }
+
     /// Whether it stands without thrust.
     pub(crate) fn is_at_rest(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let off = throttle(now, vehicle).map_or(!vehicle.armed(), |throttle| throttle < OFF);
@@ -334,8 +341,8 @@ impl Flight {
             if self.stage == Stage::Down && self.arming.off_at.is_some() {
                 self.calm();
             }
-            (self.arming.on_bench, self.arming.off_at, self.arming.stood, self.heard_at) =
-                (false, None, false, now);
+            self.arming = Arming { is_armed: true, seen_off: self.arming.seen_off, ..Arming::default() };
+            (self.tilted_at, self.heard_at) = (None, now);
             self.watch = None;
             self.thrust.forget();
         }
@@ -513,7 +520,7 @@ impl Flight {
             if self.flew_at.is_none() {
                 self.touch_mps = 0.0;
             }
-            self.flew_at = Some(now);
+            (self.flew_at, self.arming.flew) = (Some(now), true);
         }
         event
     }

@@ -1,7 +1,7 @@
 //! Conditions of the flight, as bits: computed once a step.
 
 use crate::flight::Flight;
-use crate::motion::climb_mps;
+use crate::motion::{STILL_MPS, climb_mps};
 use crate::observation::{Gnss, VehicleKind};
 use crate::thrust::Power;
 use crate::time::{BootMs, Millis, PAUSE, Stamp};
@@ -26,6 +26,9 @@ pub(crate) const HOVERS: u16 = 1 << 7;
 pub(crate) const CONTROLLED: u16 = 1 << 8;
 /// The first receiver has been exact for 15 s: `AHRS_RP_P` 0.2 makes DCM level within three time constants of 5 s.
 pub(crate) const EXACT: u16 = 1 << 9;
+
+/// Its rotors move it: with all their thrust a vehicle in the air climbs or sinks, and one that is held does neither.
+pub(crate) const DRIVEN: u16 = 1 << 10;
 
 pub(crate) const TURNED: Millis = Millis::from_secs(1);
 const EXACT_FOR: Millis = Millis::from_secs(15);
@@ -61,7 +64,9 @@ impl Gates {
         let kind = vehicle.kind();
         let hovers = vehicle.hovers(now) == Some(true);
         let rotors = kind == VehicleKind::Rotorcraft;
-        let has_thrust = !flight.thrust.has_flown || flight.power(now, vehicle) != Some(Power::Idle);
+        let power = flight.power(now, vehicle);
+        let has_thrust = !flight.thrust.has_flown || power != Some(Power::Idle);
+        let moves = || climb_mps(now, vehicle).is_none_or(|climb| climb.abs() > STILL_MPS);
         self.open = 0;
         for (gate, is_open) in [
             (AIRBORNE, flight.airborne()),
@@ -73,6 +78,7 @@ impl Gates {
             (ONE_FRAME, rotors || kind == VehicleKind::Plane),
             (HOVERS, hovers),
             (CONTROLLED, if hovers { has_thrust } else { kind != VehicleKind::Vtol }),
+            (DRIVEN, !hovers || power != Some(Power::Full) || moves()),
             (EXACT, exact && self.inexact_at.age(now).is_none_or(|age| age > EXACT_FOR)),
         ] {
             self.open |= if is_open { gate } else { 0 };

@@ -146,10 +146,8 @@ impl Pairs {
     pub(crate) fn mismatch(&self, now: BootMs, kind: Kind, sensor: usize) -> Option<Reading> {
         let beyond = self.pairs.map(|pair| pair.excess(now, kind));
         let three = beyond.iter().all(Option::is_some);
-        let mine = PAIRS
-            .iter()
-            .zip(beyond)
-            .filter(|((one, other), _)| *other == sensor || (three && *one == sensor));
+        let is_mine = |(one, other): &(usize, usize)| *other == sensor || (three && *one == sensor);
+        let mine = PAIRS.iter().zip(beyond).filter(|(pair, _)| is_mine(pair));
         mine.filter_map(|(_, beyond)| beyond)
             .reduce(|one, other| Reading { at: one.at.earlier(other.at), value: one.value.min(other.value) })
     }

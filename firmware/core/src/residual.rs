@@ -85,7 +85,7 @@ const CONSTELLATION: Row = Row { gates: gates::AIRBORNE, learn: Learn::Level, ho
 const VIBRATION: Row =
     Row { gates: gates::SETTLED | gates::CLEAR | gates::ROTORS, smoothing_s: 0.25, hold: 2.5, ..ROW };
 const RATE: Row = Row {
-    gates: gates::SETTLED | gates::CLEAR | gates::CONTROLLED,
+    gates: gates::SETTLED | gates::CLEAR | gates::CONTROLLED | gates::DRIVEN,
     smoothing_s: 1.0,
     step_max: Millis::from_millis(500),
     is_two_sided: true,

@@ -94,7 +94,8 @@ impl Flight {
             && now.since(watch.since) > WATCH
     }
 
-    fn stands_off(&self, now: BootMs, vehicle: &Vehicle) -> bool {
+    /// Whether it has been level and still for a second, and slow.
+    pub(crate) fn stands_off(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let slow = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() < STILL_MPS);
         now.since(self.felt.at) <= STILL
             && vehicle.inertial.is_level_for(now, STILL)

@@ -1,14 +1,12 @@
 //! The autopilot's processor.
 
 use super::prelude::*;
-use crate::motion::{STILL_MPS, climb_mps, ground_speed_mps};
 use crate::observation::Heartbeat;
 use crate::time::Millis;
 
-/// A vehicle that was killed at its touchdown is at rest after [`COMES_TO_REST`]: level and still for [`RESTS`], slower than [`STILL_MPS`]. In
-/// two real landings the sensors were still 0.6 and 1.2 s after the kill.
-const COMES_TO_REST: Millis = Millis::from_secs(2);
-const RESTS: Millis = Millis::from_millis(300);
+/// A vehicle that was killed at its touchdown has been level and still for a second after this time. In two real landings the sensors were
+/// still 0.6 and 1.2 s after the kill.
+const COMES_TO_REST: Millis = Millis::from_secs(3);
 
 const LOAD: Check = Check {
     name: "load",
@@ -41,15 +39,13 @@ pub(super) const CHECKS: &[Check] = &[
 /// glides or hangs on a parachute after [`COMES_TO_REST`].
 fn state(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     const ACTIVE: u8 = 4;
-    let Inputs { now, vehicle, .. } = *inputs;
-    let slow = |speed_mps: Option<f32>| speed_mps.is_none_or(|speed_mps| libm::fabsf(speed_mps) < STILL_MPS);
-    let rests = || {
-        vehicle.inertial.is_level_for(now, RESTS)
-            && slow(climb_mps(now, vehicle))
-            && slow(ground_speed_mps(now, vehicle))
-    };
-    let ended = vehicle.terminated_since.is_some_and(|since| now.since(since) >= COMES_TO_REST) && !rests();
-    let stands = |state| state <= vehicle.state_since_arming || state == Heartbeat::TERMINATED && !ended;
+    let Inputs { now, vehicle, derived, flight, .. } = *inputs;
+    let ended = vehicle.terminated_since.is_some_and(|since| now.since(since) >= COMES_TO_REST);
+    let killed_on_ground = || !ended || flight.stands_off(now, vehicle);
+    // Without a pack it is in its failsafe for the battery.
+    let is_idle =
+        |state| if state == Heartbeat::TERMINATED { killed_on_ground() } else { derived.cells.lack_pack() };
+    let stands = |state| state <= vehicle.state_since_arming || is_idle(state);
     let counts = |state| if stands(state) { ACTIVE.min(state) } else { state };
     vehicle.heartbeat.read(|heartbeat| Some(f32::from(counts(heartbeat.state))))
 }

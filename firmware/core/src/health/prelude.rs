@@ -9,6 +9,7 @@ pub(super) use super::suppression::{
     COMPASS, DISTURBANCES, DRIVE, ESTIMATORS, FAILSAFES, GYROS, Group, INERTIAL, RATES, RECEIVERS, Role,
     SHAKING, TURNS, VIBRATION, WRONG_RECEIVERS,
 };
+use crate::alert::ENDED;
 pub(super) use crate::cause::Cause;
 pub(super) use crate::latest::{Latest, Reading};
 use crate::observation::VibrationScale;
@@ -75,9 +76,15 @@ macro_rules! alert {
 }
 pub(super) use alert;
 
+/// The autopilot's word. One that measurements contradict does not count.
 pub(super) fn said(inputs: &Inputs<'_>, cause: Cause) -> Option<Reading> {
-    let level = inputs.vehicle.alerts.level(inputs.now, cause, inputs.flight.in_mishap());
-    inputs.reading(level?)
+    let level = inputs.vehicle.alerts.level(inputs.now, cause, inputs.flight.in_mishap())?;
+    let is_contradicted = match cause {
+        Cause::Crash => inputs.flight.stayed(),
+        Cause::Power => inputs.derived.cells.lack_pack(),
+        _ => false,
+    };
+    inputs.reading(if is_contradicted { ENDED } else { level })
 }
 
 pub(super) const DUE: Check = Check {
