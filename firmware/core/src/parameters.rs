@@ -129,7 +129,7 @@ with_parts! {
     EkfRatioWarn "EKF_RATIO_WARN" "" 0.5 0.0 10.0 "PX4 innovation test ratio, half way" is "Estimator test ratio, that of the compass too: warning above";
     EkfRatioCrit "EKF_RATIO_CRIT" "" 1.0 0.0 10.0 "PX4: a ratio above 1 rejects the sensor" is "Estimator test ratio, that of the compass too: critical above";
     GpsSatsWarn "GPS_SATS_WARN" "" 6.0 0.0 60.0 "PX4 EKF2_REQ_NSATS 6, the least before a takeoff";
-    GpsHdopWarn "GPS_HDOP_WARN" "" 2.5 0.0 50.0 "PX4 EKF2_REQ_PDOP 2.5";
+    GpsHdopWarn "GPS_HDOP_WARN" "" 3.0 0.0 50.0 "receivers with a 3D fix and 7 to 9 satellites report up to 2.9";
     GpsHaccWarn "GPS_HACC_WARN" "m" 3.0 0.0 100.0 "PX4 EKF2_REQ_EPH 3 m";
     GpsFixCrit "GPS_FIX_CRIT" "" 3.0 0.0 6.0 "less than a 3D fix in flight";
     LinkAgeWarn "LINK_AGE_WARN" "s" 3.5 0.5 60.0 "ArduPilot sends none for up to 3 s while it calibrates at its start";

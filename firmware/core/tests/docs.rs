@@ -171,7 +171,7 @@ fn every_text_of_a_check_is_in_the_runbook() {
     let mut told = Vec::new();
     for (words, check) in VOCABULARY.iter().zip(checks()) {
         let RadioWords { alarm, advice, .. } = words.said;
-        if told.contains(&alarm) {
+        if told.contains(&alarm) || check.told_after_s == Check::RECORDED {
             continue;
         }
         told.push(alarm);
@@ -199,12 +199,10 @@ fn every_counter_is_documented() {
         if let Some(text) = line.trim().strip_prefix("/// ") {
             words.push(text);
         } else if let Some((form, name)) = line.split_once(" \"") {
-            let over = if form.ends_with("Highest") {
-                "greatest"
-            } else if form.ends_with("Lowest") {
-                "least"
-            } else {
-                "sum"
+            let over = match form {
+                form if form.ends_with("Highest") => "greatest",
+                form if form.ends_with("Lowest") => "least",
+                _ => "sum",
             };
             let _ = writeln!(
                 table,

@@ -148,7 +148,7 @@ pub struct Check {
     pub limits: Limits,
     /// How long it must be bad before it is a warning, and before it is critical, milliseconds: a minute at most.
     pub debounce_ms: [u16; 2],
-    /// How long it must be bad before its warning is told, if that is longer, seconds.
+    /// How long it must be bad before its warning is told, if that is longer, seconds; or [`Check::RECORDED`].
     pub told_after_s: u8,
     /// When the check applies.
     pub when: CheckPhase,
@@ -266,6 +266,9 @@ pub struct LevelChange {
 }
 
 impl Check {
+    /// The pilot gets no text of it; record and report have its findings.
+    pub const RECORDED: u8 = u8::MAX;
+
     /// How old the value may be; `None` for values that are ages themselves.
     pub fn stale_after(&self) -> Option<Millis> {
         self.stale_s.map(|seconds| Millis::from_secs(seconds.get().into()))

@@ -20,7 +20,7 @@ const LOAD: Check = Check {
 };
 
 pub(super) const CHECKS: &[Check] = &[
-    LOAD,
+    Check { told_after_s: Check::RECORDED, ..LOAD },
     row!("mcu_temperature" LOAD, above(McuTempWarn McuTempCrit 2.0), unit: Unit::of("degC"),
         read: |inputs, _| inputs.vehicle.processor.read(|processor| Some(processor.temperature?.0))),
     row!("autopilot_reboot" LOAD, above(_ RebootCrit 0.0), role: Role::of(Group::Reboot, 0), unit: Unit::FLAG,
@@ -29,10 +29,11 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::Other, FAILSAFES | Group::Failsafe.bit()), unit: Unit::FLAG,
         debounce_ms: [2_000, 500], when: CheckPhase::Armed, alarm_only: true, read: state),
     alert!(Processor Computer, Role::NONE),
-    alert!(Logging Computer, Role::NONE),
+    Check { told_after_s: Check::RECORDED, ..alert!(Logging Computer, Role::NONE) },
     alert!(Fence Computer, Role::NONE),
     alert!(Failsafe Computer, Role::of(Group::Failsafe, FAILSAFES)),
-    alert!(Other Computer, Role::NONE),
+    // The pilot has its text from the autopilot.
+    Check { told_after_s: Check::RECORDED, ..alert!(Other Computer, Role::NONE) },
 ];
 
 /// `MAV_STATE`, without a failsafe that stands since before the arming. PX4's kill switch is a termination, and pilots press it after a touchdown. A vehicle that was terminated in the air falls,

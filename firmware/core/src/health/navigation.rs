@@ -92,7 +92,7 @@ pub(super) const CHECKS: &[Check] = &[
     // PX4 reports no ratio of a compass that it does not use: see `compass_unused`.
     row!("ekf_mag_ratio" ESTIMATOR, above(EkfRatioWarn EkfRatioCrit 0.05),
         role: Role::of(Group::Sensor, COMPASS | Group::CompassUse.bit() | TURNS), stale_s: None,
-        read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass)),
+        told_after_s: 10, read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass)),
     // A compass in use is not thereby good.
     row!("compass_unused" ESTIMATOR, above(AlertWarn _ 0.05),
         role: Role::of(Group::CompassUse, COMPASS | TURNS), unit: Unit::FLAG, alarm_only: true,
