@@ -5,8 +5,9 @@
 //! watchdog, an eject or ten minutes without a host end the mode by a reset. Only the start after an eject counts
 //! as one by hand. A plugged cable never starts the mode: a charger in the field must not stop a recording.
 //!
-//! There is no executor. The disk's server polls the USB stack while it waits, also for a block of the card. The
-//! identification of a card blocks it for 8 s at most; [`watch`] feeds the watchdog meanwhile.
+//! There is no executor. The disk's server polls the USB stack while it waits, also for a block of the card, and sleeps until the
+//! next interrupt when it has nothing to do. The identification of a card blocks it for 8 s at most; [`watch`] feeds the watchdog
+//! meanwhile.
 
 use core::future::{Future as _, poll_fn};
 use core::pin::pin;
@@ -38,6 +39,8 @@ const PARTING: Span = Span::from_secs(1);
 const LOOP_TURNS_MAX: u32 = 100;
 /// How often the autopilot's port is looked at: its ring holds 22 ms. After a longer identification of a card its bytes are lost.
 const LISTEN_EVERY: Span = Span::from_millis(1);
+/// Longest sleep: the autopilot's port is looked at, and what a task of the bus told another one is done.
+const NAP_MICROS: u32 = 500;
 /// How often the bus is looked at and the LED's pin is set: a pin of the debug port is not the LED's at first.
 const LOOK_EVERY: Span = Span::from_millis(100);
 
@@ -106,7 +109,8 @@ pub(crate) fn run(
         }
         false
     };
-    Server::new(to_bus, &lane, &link).run(&mut disk, &mut meanwhile);
+    Server::new(to_bus, &lane, &link, || board::nap(NAP_MICROS, cortex_m::asm::wfe))
+        .run(&mut disk, &mut meanwhile);
     let end = now() + PARTING;
     while now() < end {
         meanwhile();

@@ -6,7 +6,7 @@
 //! ```
 //! The server is plain code that waits for the card and for room. All waits call the rest of the program (`meanwhile`), the
 //! bus among it. So the card is read while the bus sends. Until the next command comes, the server reads the blocks behind the
-//! last ones into a free chunk.
+//! last ones into a free chunk. With nothing to do it sleeps (`idle`).
 
 use core::cell::Cell;
 
@@ -100,17 +100,20 @@ pub struct Server<'a, 'b> {
     chunks: zerocopy_channel::Sender<'a, NoopRawMutex, Chunk<'b>>,
     lane: &'a Lane,
     link: &'a Link,
+    idle: fn(),
     aborts: u32,
 }
 
 impl<'a, 'b> Server<'a, 'b> {
-    /// The side that fills the chunks. Lane and link must be those of the class.
+    /// The side that fills the chunks. Lane and link must be those of the class. `idle` returns after the next interrupt, or at
+    /// once if one came since it returned.
     pub const fn new(
         chunks: zerocopy_channel::Sender<'a, NoopRawMutex, Chunk<'b>>,
         lane: &'a Lane,
         link: &'a Link,
+        idle: fn(),
     ) -> Self {
-        Self { chunks, lane, link, aborts: 0 }
+        Self { chunks, lane, link, idle, aborts: 0 }
     }
 
     /// Serves the disk until the host has ejected it, and has the status of that command.
@@ -120,18 +123,20 @@ impl<'a, 'b> Server<'a, 'b> {
         }
         while !self.chunks.is_empty() {
             meanwhile();
+            (self.idle)();
         }
     }
 
     fn command<C: CardDevice>(&mut self, disk: &mut Disk<C>, meanwhile: WaitWork<'_>) -> Result<(), Aborted> {
         let (packet, bytes) = loop {
+            meanwhile();
             if let Ok(packet) = self.lane.packets.try_receive() {
                 break packet;
             }
             if let Some(chunk) = self.chunks.try_send() {
                 disk.read_ahead(chunk, meanwhile);
             }
-            meanwhile();
+            (self.idle)();
         };
         self.aborts = self.lane.aborts.get();
         let Ok(mut transport) = Transport::begin(packet.get(..bytes).unwrap_or_default(), disk) else {
@@ -139,7 +144,6 @@ impl<'a, 'b> Server<'a, 'b> {
             return self.wait(meanwhile, |_| None::<()>);
         };
         loop {
-            meanwhile();
             self.wait(meanwhile, |server| server.chunks.try_send().map(drop))?;
             let Some(chunk) = self.chunks.try_send() else { continue };
             let step = transport.step(disk, chunk, meanwhile);
@@ -168,11 +172,12 @@ impl<'a, 'b> Server<'a, 'b> {
         mut look: impl FnMut(&mut Self) -> Option<T>,
     ) -> Result<T, Aborted> {
         loop {
+            meanwhile();
             self.check()?;
             if let Some(found) = look(self) {
                 return Ok(found);
             }
-            meanwhile();
+            (self.idle)();
         }
     }
 }

@@ -27,6 +27,7 @@ pub(crate) use pins::PinPort;
 pub(crate) use port::{PortRx, PortTx, halves};
 pub(crate) use random::number as random_number;
 pub(crate) use reset::{reset_cause, restart};
+pub(crate) use time::nap;
 pub(crate) use usb::{begin_with_data0, drop_control_packet, frame_number, has_bus_event};
 
 use crate::boards::machine::SYSTICK_RELOAD;

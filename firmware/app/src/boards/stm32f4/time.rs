@@ -86,12 +86,12 @@ pub(super) fn start() {
     unsafe { interrupt::TIM2.enable() };
 }
 
-/// Sleeps for this many microseconds or until an earlier interrupt. It uses the counter's second channel, so only one task may
-/// call it: the least urgent.
-pub(super) fn nap(micros: u32) {
+/// Sleeps for this many microseconds or until an earlier interrupt, by WFI, or by WFE: not at all if an interrupt came since
+/// the last time. It uses the counter's second channel, so only one task may call it: the least urgent.
+pub(crate) fn nap(micros: u32, sleep: impl FnOnce()) {
     TIM2.ccr(1).write_value(TIM2.cnt().read().wrapping_add(micros));
     TIM2.dier().modify(|w| w.set_ccie(1, true));
-    measure(Stage::Idle, cortex_m::asm::wfi);
+    measure(Stage::Idle, sleep);
     TIM2.dier().modify(|w| w.set_ccie(1, false));
 }
 
