@@ -14,8 +14,8 @@ const MONITOR: &str = "CAN1_RX0";
 const DOWNLINK: &str = "CAN1_RX1";
 const STORAGE: &str = "CAN1_SCE";
 
-/// `b .`
-const HANG: [u8; 2] = [0xFE, 0xE7];
+/// `wfi; b .-2`: the model has few instructions to run.
+const HANG: [u8; 4] = [0x30, 0xBF, 0xFD, 0xE7];
 /// `mov.w r0, #0x30000000`, an address without memory; `ldr r0, [r0]`
 const BUS_FAULT: [u8; 6] = [0x4F, 0xF0, 0x40, 0x50, 0x00, 0x68];
 /// `push {r0-r7, lr}`, again and again.
@@ -77,7 +77,7 @@ fn a_task_that_never_comes_back_is_named_by_the_next_start_however_urgent_it_is(
         let mut rig = flying();
         let since = rig.machine.now();
         let address = rig.replace(handler, &HANG, handler != STORAGE).unwrap();
-        let fault = format!("fault: hangs in {task} at pc {address:08x}");
+        let fault = format!("fault: hangs in {task} at pc {:08x}", address + 2);
         let told = format!("HUMS: restarted after: watchdog ({task})");
         survives(
             &mut rig,
