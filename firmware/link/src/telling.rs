@@ -102,7 +102,9 @@ impl SentFindings {
     pub(crate) fn is_news(&mut self, finding: &Finding) -> bool {
         let Some(key) = key(finding) else { return finding.because.is_empty() };
         match finding.level {
-            _ if check_of(key.0).is_some_and(|check| check.told_after_s == Check::RECORDED) => false,
+            Level::Warning if check_of(key.0).is_some_and(|check| check.told_after_s == Check::RECORDED) => {
+                false
+            }
             Level::Ok if finding.subsystem == Subsystem::Mishap => {
                 // Its flying on has a text of its own, or a new event begins.
                 self.events[Subsystem::Mishap as usize] = Event::NONE;

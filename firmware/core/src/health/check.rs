@@ -266,7 +266,7 @@ pub struct LevelChange {
 }
 
 impl Check {
-    /// The pilot gets no text of it; record and report have its findings.
+    /// The pilot gets no text of its warnings; record and report have them.
     pub const RECORDED: u8 = u8::MAX;
 
     /// How old the value may be; `None` for values that are ages themselves.

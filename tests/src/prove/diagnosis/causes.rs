@@ -131,12 +131,6 @@ pub(super) const CLASSES: &[Class] = &[
             "sinking",
             "overturned",
             "crash_alert",
-            // It turns over before it hits the ground.
-            "roll",
-            "pitch",
-            "roll_rate",
-            "pitch_rate",
-            "attitude_alert",
         ],
     },
     Class {

@@ -16,7 +16,7 @@ alarm is false. The box's monitor judged these recordings with default limits, o
   of the failed part (`tests/src/prove/diagnosis/causes.rs`). Faults that no message shows are not counted.
 * An alarm is **false** if nothing was wrong: without a fault, before it, or in weather that the autopilot resists. Each rise counts.
 * **Known** flights were there when the limits were chosen: their figures show only that nothing got worse. All others were judged once, and measure the box.
-* **Real flights** are public logs of [ArduPilot](real-flights.csv) and [PX4](real-flights-px4.csv), [labelled by hand](../tests/real-flights/README.md). All of them are known now. `judged-2`, 124 recordings of 23 other owners, was judged once, by 429211c: **2.7 false warnings and 3.6 false criticals an armed hour, the failed part first in 14 of 31 faults** (a text up to 10 s before the fault counted against it then, and the tilt did not count for a crash). The table is of the checks since: no other set has judged them yet.
+* **Real flights** are public logs of [ArduPilot](real-flights.csv) and [PX4](real-flights-px4.csv), [labelled by hand](../tests/real-flights/README.md). All of them are known now. `judged-2`, 124 recordings of 23 other owners, was judged once, by 429211c: **2.7 false warnings and 3.6 false criticals an armed hour, the failed part first in 14 of 31 faults**. The table is of the checks since.
 * **Simulator flights** are the repository's [labelled flights](../tests/labelled/README.md) and the sets SITL A to M. No check knows a label.
 * Bounds (\"at least\", \"at most\") are exact, 95 %. Delays are seconds after the fault. Hours are in the air. [health.md](health.md) explains the checks.
 

@@ -49,7 +49,7 @@ pub(super) const RATES: Form = Form {
     title: "Real flights",
     about: "Texts to the pilot, as a box in the vehicle had selected and sent them, in the words of the cause if that was known. Rates are per armed hour, \
             without unlabelled findings. A needless finding is true, but no pilot, mechanic or owner would act on it. Fault first: of so many known \
-            faults the first text to the pilot was of the failed part, of a crash also of the tilt; texts of other parts before the fault do not count. Hours of simulators are in the air without a fault; each alarm in them is false.",
+            faults the first text to the pilot was of the failed part. Hours of simulators are in the air without a fault; each alarm in them is false.",
     columns: &[
         "flights",
         "judged",
@@ -262,20 +262,14 @@ fn of(flight: &Flight, judged: &Judgement) -> Outcome {
             evidence: label.map_or_else(String::new, |label| label.evidence.clone()),
         }
     });
-    let told: Vec<Told> = told.collect();
     Outcome {
         name: flight.name.clone(),
         armed_s: judged.armed.as_millis() as f64 / 1e3,
         right_first: flight.fault.map(|Fault { class, onset_s }| {
-            let is_right =
-                |told: &Told| told.verdict != Verdict::False && class.checks.contains(&told.check.as_str());
-            // An earlier text of another part is of another fault.
-            let earlier_s = |told| if is_right(told) { EARLIER_S } else { 0.0 };
-            let mut texts = judged.told.iter().zip(&told);
-            let first = texts.find(|(sent, told)| onset_s - earlier_s(told) <= sent.at.as_secs_f64());
-            first.is_some_and(|(_, told)| is_right(told))
+            let first = judged.told.iter().find(|told| onset_s - EARLIER_S <= told.at.as_secs_f64());
+            first.is_some_and(|first| class.checks.contains(&first.check.as_str()))
         }),
-        told,
+        told: told.collect(),
     }
 }
 
@@ -448,9 +442,7 @@ mod tests {
             rates(&[judge(&find(folder.path(), Known::Yes).unwrap().unwrap()).unwrap()], &[])[0][13][..1]
                 .to_owned()
         };
-        // The vibration of 86 s is before the fault, unless it is of the failed part.
-        let cases = [",flight,power", "100,flight,power", "225.6,flight,power", "100,flight,vibration"];
-        assert_eq!(cases.map(right), ["0", "1", "1", "1"]);
+        assert_eq!((right(",flight,power"), right("225.6,flight,power")), ("0".into(), "1".into()));
     }
 
     #[test]
@@ -466,7 +458,9 @@ mod tests {
             ("ap_quad_faults.tlog,,,nan,flight,gnss\n", "onset nan is no time"),
             ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,,inf,true,\n", "onset inf"),
             ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,-1,,true,\n", "instance -1"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,1.7,,true,\n", "instance 1.7"),
             ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,300,,true,\n", "instance 300"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,nan,,true,\n", "instance nan"),
         ] {
             let error = refusal(labels);
             assert!(error.contains(said) && error.contains("labels-mine.csv"), "{error}");
