@@ -39,8 +39,6 @@ const PARTING: Span = Span::from_secs(1);
 const LOOP_TURNS_MAX: u32 = 100;
 /// How often the autopilot's port is looked at: its ring holds 22 ms. After a longer identification of a card its bytes are lost.
 const LISTEN_EVERY: Span = Span::from_millis(1);
-/// Longest sleep: the autopilot's port is looked at, and what a task of the bus told another one is done.
-const NAP_MICROS: u32 = 500;
 /// How often the bus is looked at and the LED's pin is set: a pin of the debug port is not the LED's at first.
 const LOOK_EVERY: Span = Span::from_millis(100);
 
@@ -109,8 +107,9 @@ pub(crate) fn run(
         }
         false
     };
-    Server::new(to_bus, &lane, &link, || board::nap(NAP_MICROS, cortex_m::asm::wfe))
-        .run(&mut disk, &mut meanwhile);
+    // Within half a millisecond the autopilot's port is looked at, and what a task of the bus told another one is done.
+    let idle = || board::nap(500, cortex_m::asm::wfe);
+    Server::new(to_bus, &lane, &link, idle).run(&mut disk, &mut meanwhile);
     let end = now() + PARTING;
     while now() < end {
         meanwhile();

@@ -134,8 +134,7 @@ impl Alerts {
     pub(crate) fn take_sensors(&mut self, at: BootMs, sensors: &Sensors) {
         let healthy = Causes::of_sensors(sensors.healthy);
         self.had = self.had.or(healthy);
-        let lost = Causes::of_sensors(sensors.lost).both(self.had);
-        let wrong = Causes::of_sensors(sensors.unhealthy).or(lost);
+        let wrong = Causes::of_sensors(sensors.unhealthy).or(Causes::of_sensors(sensors.lost)).both(self.had);
         self.sensors.take(at, wrong, healthy.or(wrong));
     }
 
@@ -161,10 +160,9 @@ impl Alerts {
         let is_judged = self.armed && !in_mishap;
         let flags = [&self.sensors, &self.failures, &self.estimator];
         let said = |failed| is_judged && flags.iter().any(|flags| flags.says(now, cause) == Some(failed));
-        let is_flagged = said(true) && (cause != Cause::RemoteControl || self.had.has(cause));
         let holds = told.is_some_and(|(_, until)| !now.is_after(until));
         let held = urgency.filter(|urgency| *urgency != Urgency::Over && holds);
-        let wrong = held.max(is_flagged.then_some(Urgency::Warning));
+        let wrong = held.max(said(true).then_some(Urgency::Warning));
         let is_over = urgency == Some(Urgency::Over) || said(false);
         let good = if is_over { f32::from(Urgency::Over as u8) } else { ENDED };
         // Once flags were received each cause has a level.

@@ -37,8 +37,6 @@ const CELL_LOADED_V: f32 = 2.8;
 const ANOTHER: f32 = 0.7;
 /// Flag of a stored count that the last flight did not confirm.
 pub(crate) const DOUBTED: u8 = 0x80;
-/// Of a board or of servos, and of no pack: a full cell has less, and two that can fly have 3.2 V each.
-const SUPPLY_V: core::ops::Range<f32> = CELL_HIGHEST_V..6.4;
 /// Below this no battery is connected.
 const PLUGGED_V: f32 = 2.5;
 /// `ArduPilot`'s default of `BATT_LOW_VOLT`.
@@ -227,11 +225,6 @@ impl Cells {
             |pack: &Pack| Some(self.settings.get(usize::from(pack.id))?[Setting::Capacity as usize]);
         let each_ah = heard.map(|pack| set_mah(pack).filter(|mah| *mah > 0.0).map(|mah| mah / 1_000.0));
         each_ah.sum::<Option<f32>>().unwrap_or(0.0)
-    }
-
-    /// Whether all that is measured is the supply of a board.
-    pub(crate) fn lack_pack(&self) -> bool {
-        SUPPLY_V.contains(&self.packs.iter().map(|pack| pack.highest_v).fold(0.0, f32::max))
     }
 
     pub(crate) fn has_voltage(&self, battery: usize) -> bool {

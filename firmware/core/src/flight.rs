@@ -249,9 +249,9 @@ impl Flight {
         self.seen_on_ground && !self.is_open()
     }
 
-    /// Whether it has stood level since it was armed, neither in the air nor turned over.
-    pub(crate) fn stayed(&self) -> bool {
-        self.arming.stood && !self.arming.flew && self.tilted_at.is_none()
+    /// Whether a vehicle on rotors has never flown since it was armed, and has been level and still for a second.
+    pub(crate) fn stayed(&self, now: BootMs, vehicle: &Vehicle) -> bool {
+        on_rotors(now, vehicle) && !self.arming.flew && vehicle.inertial.is_level_for(now, STILL)
     }
 
     /// Whether it stands without thrust.
@@ -341,8 +341,8 @@ impl Flight {
             if self.stage == Stage::Down && self.arming.off_at.is_some() {
                 self.calm();
             }
-            self.arming = Arming { is_armed: true, seen_off: self.arming.seen_off, ..Arming::default() };
-            (self.tilted_at, self.heard_at) = (None, now);
+            (self.arming.on_bench, self.arming.off_at, self.heard_at) = (false, None, now);
+            (self.arming.stood, self.arming.flew) = (false, false);
             self.watch = None;
             self.thrust.forget();
         }

@@ -1,7 +1,7 @@
 //! Conditions of the flight, as bits: computed once a step.
 
 use crate::flight::Flight;
-use crate::motion::{STILL_MPS, climb_mps};
+use crate::motion::{STILL_MPS, climb_mps, ground_speed_mps};
 use crate::observation::{Gnss, VehicleKind};
 use crate::thrust::Power;
 use crate::time::{BootMs, Millis, PAUSE, Stamp};
@@ -27,7 +27,7 @@ pub(crate) const CONTROLLED: u16 = 1 << 8;
 /// The first receiver has been exact for 15 s: `AHRS_RP_P` 0.2 makes DCM level within three time constants of 5 s.
 pub(crate) const EXACT: u16 = 1 << 9;
 
-/// Its rotors move it: with all their thrust a vehicle in the air climbs or sinks, and one that is held does neither.
+/// Its rotors move it: with all their thrust a vehicle in the air is faster than one that is held or carried.
 pub(crate) const DRIVEN: u16 = 1 << 10;
 
 pub(crate) const TURNED: Millis = Millis::from_secs(1);
@@ -66,7 +66,8 @@ impl Gates {
         let rotors = kind == VehicleKind::Rotorcraft;
         let power = flight.power(now, vehicle);
         let has_thrust = !flight.thrust.has_flown || power != Some(Power::Idle);
-        let moves = || climb_mps(now, vehicle).is_none_or(|climb| climb.abs() > STILL_MPS);
+        let moves = |mps: Option<f32>| mps.is_none_or(|mps| mps.abs() > STILL_MPS);
+        let moves = || moves(climb_mps(now, vehicle)) || moves(ground_speed_mps(now, vehicle));
         self.open = 0;
         for (gate, is_open) in [
             (AIRBORNE, flight.airborne()),

@@ -121,10 +121,7 @@ impl<'a, 'b> Server<'a, 'b> {
         while !disk.is_ejected() {
             let _ = self.command(disk, meanwhile);
         }
-        while !self.chunks.is_empty() {
-            meanwhile();
-            (self.idle)();
-        }
+        let _ = self.wait(meanwhile, |server| server.chunks.is_empty().then_some(()));
     }
 
     fn command<C: CardDevice>(&mut self, disk: &mut Disk<C>, meanwhile: WaitWork<'_>) -> Result<(), Aborted> {

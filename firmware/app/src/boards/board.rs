@@ -18,7 +18,8 @@ use super::stm32f4::{
 };
 pub(crate) use super::stm32f4::{
     LATE_TURNS, Led, PortRx, PortTx, StoreFlash, begin_with_data0, chip_is_wrong, crystal_failed,
-    crystal_is_wrong, drop_control_packet, feed_watchdog, frame_number, has_bus_event, idle, nap, restart,
+    crystal_is_wrong, drop_control_packet, feed_watchdog, frame_number, has_bus_event, idle, restart,
+    time::nap,
 };
 
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);

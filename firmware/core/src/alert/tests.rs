@@ -61,7 +61,7 @@ fn words_and_flags_hold_as_long_as_they_should() {
         "0 arm; 0 flags; 0 Compass = 0; 1 flags 2; 1 Compass = 0; 2 flags 2; 2 Compass = 1; 3 flags; 3 Compass = 0; \
          4 flags 2; 4 Compass = 0; 5 flags 2; 5 Compass = 1; 10 Compass = 1; 11 Compass = ended; 12 flags; \
          12 Compass = 0; 12 Crash = ended; 13 disarm; 13 Compass = ended",
-        "0 arm; 0 flags 16; 0 RemoteControl = 0; 1 flags 16; 1 RemoteControl = ended; 2 flags; 2 RemoteControl = 0; \
+        "0 arm; 0 flags 16; 0 RemoteControl = ended; 1 flags 16; 1 RemoteControl = ended; 2 flags; 2 RemoteControl = 0; \
          3 flags 16; 3 RemoteControl = 0; 4 flags 16; 4 RemoteControl = 1",
     ] {
         play(script);

@@ -25,8 +25,10 @@ const UNLOADED: Millis = Millis::from_millis(200);
 const DROPS: Millis = Millis::from_millis(300);
 const BROKEN_OFF: f32 = 0.4;
 pub(super) const BREAKS_OFF: Millis = Millis::from_secs(1);
-/// A shock counts if the vehicle lies still within this time: it may bounce, or thrash about.
-const AFTER_SHOCK: Millis = Millis::from_secs(8);
+/// A vehicle whose speed broke off thrashes about for so long at most.
+const THRASHES: Millis = Millis::from_secs(8);
+/// A shock counts if the vehicle lies still within this time.
+const AFTER_SHOCK: Millis = Millis::from_secs(4);
 /// A shock stops a vehicle that was this fast, m/s.
 const IMPACT_MPS: f32 = 3.5;
 /// Shock, g, and sink, m/s, of a landing on legs. The fastest landing speed that can be set is 2.5 m/s.
@@ -250,8 +252,12 @@ impl Flight {
 
     fn take_shock(&mut self, at: BootMs, load_g: f32, vehicle: &Vehicle, params: &Params) {
         if load_g.is_finite() && load_g > params.get(Param::MisImpact) {
-            let before = self.shock.filter(|shock| {
-                at.since(shock.at) <= BREAKS_OFF || shock.stopped || shock.dropped || shock.has_hit
+            // An impact goes on while the vehicle bounces, or thrashes about.
+            let before = self.shock.and_then(|shock| {
+                let ends = shock.stopped || shock.dropped || shock.has_hit;
+                let thrashes = ends && at.since(self.hit_at) <= THRASHES;
+                let at = if at.since(shock.at) <= BREAKS_OFF { shock.at } else { at };
+                (at == shock.at || thrashes).then_some(Shock { at, ..shock })
             });
             let shock = before.unwrap_or(Shock {
                 at,

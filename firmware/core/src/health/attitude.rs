@@ -1,7 +1,7 @@
 //! Roll and pitch of vehicles on rotors. A plane banks as it needs to, and so does a VTOL while it flies on its wings.
 //!
 //! Pilots bank a multicopter steeply, and the autopilot turns their sticks into a setpoint ([`crate::vehicle::Vehicle::wanted`]). So an angle
-//! counts only if it is further than [`FOLLOWS`] from the setpoint. Without a setpoint it counts, except in modes that let the pilot bank
+//! counts only if it is further than [`FOLLOWS_RAD`] from the setpoint. Without a setpoint it counts, except in modes that let the pilot bank
 //! freely.
 
 use super::prelude::*;
@@ -13,7 +13,7 @@ use crate::units::Radians;
 
 /// 25 degrees: an attitude follows the wanted one within this, but for moments that are shorter than the debounce. The thrust loss
 /// and crash checks of `ArduCopter` take 30 degrees.
-const FOLLOWS: f32 = 0.906;
+const FOLLOWS_RAD: f32 = 0.436;
 
 const ROLL: Check = Check {
     name: "roll",
@@ -44,7 +44,7 @@ fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) ->
     let degrees = |attitude: &Attitude| {
         let is = angle(attitude).0;
         let asked = is_made_to_turn(vehicle)
-            || told.map_or_else(|| is_banked_by_hand(vehicle), |told| libm::cosf(is - told) > FOLLOWS);
+            || told.map_or_else(|| is_banked_by_hand(vehicle), |told| apart(is, told) < FOLLOWS_RAD);
         let angle_deg = is.to_degrees().abs();
         // No angle is too much on wings or in transition, and none counts that the sensors contradict.
         let counts = vehicle.hovers(now) == Some(true) && !asked && flight.believes_attitude(now, vehicle);
@@ -53,4 +53,10 @@ fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) ->
         if judged || !is.is_finite() { angle_deg } else { 0.0 }
     };
     Reading::new(vehicle.attitude.at(), vehicle.attitude.get().map(degrees))
+}
+
+/// Of angles of one turn.
+fn apart(one: f32, other: f32) -> f32 {
+    let apart = libm::fabsf(one - other);
+    apart.min(core::f32::consts::TAU - apart)
 }

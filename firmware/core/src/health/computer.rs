@@ -40,13 +40,11 @@ pub(super) const CHECKS: &[Check] = &[
 /// glides or hangs on a parachute after [`COMES_TO_REST`].
 fn state(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     const ACTIVE: u8 = 4;
-    let Inputs { now, vehicle, derived, flight, .. } = *inputs;
+    let Inputs { now, vehicle, flight, .. } = *inputs;
     let ended = vehicle.terminated_since.is_some_and(|since| now.since(since) >= COMES_TO_REST);
-    let killed_on_ground = || !ended || flight.stands_off(now, vehicle);
-    // Without a pack it is in its failsafe for the battery.
-    let is_idle =
-        |state| if state == Heartbeat::TERMINATED { killed_on_ground() } else { derived.cells.lack_pack() };
-    let stands = |state| state <= vehicle.state_since_arming || is_idle(state);
+    let killed_on_ground =
+        |state| state == Heartbeat::TERMINATED && (!ended || flight.stands_off(now, vehicle));
+    let stands = |state| state <= vehicle.state_since_arming || killed_on_ground(state);
     let counts = |state| if stands(state) { ACTIVE.min(state) } else { state };
     vehicle.heartbeat.read(|heartbeat| Some(f32::from(counts(heartbeat.state))))
 }

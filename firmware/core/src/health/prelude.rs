@@ -76,15 +76,11 @@ macro_rules! alert {
 }
 pub(super) use alert;
 
-/// The autopilot's word. One that measurements contradict does not count.
+/// The autopilot's word. A crash of a vehicle that stands and never flew does not count.
 pub(super) fn said(inputs: &Inputs<'_>, cause: Cause) -> Option<Reading> {
     let level = inputs.vehicle.alerts.level(inputs.now, cause, inputs.flight.in_mishap())?;
-    let is_contradicted = match cause {
-        Cause::Crash => inputs.flight.stayed(),
-        Cause::Power => inputs.derived.cells.lack_pack(),
-        _ => false,
-    };
-    inputs.reading(if is_contradicted { ENDED } else { level })
+    let is_none = cause == Cause::Crash && inputs.flight.stayed(inputs.now, inputs.vehicle);
+    inputs.reading(if is_none { ENDED } else { level })
 }
 
 pub(super) const DUE: Check = Check {

@@ -49,7 +49,7 @@ impl Pause {
 
     pub(super) fn before(&self) {
         if self.looks > LOOKS {
-            super::nap(NAP_US, cortex_m::asm::wfi);
+            time::nap(NAP_US, cortex_m::asm::wfi);
         }
     }
 

@@ -8,7 +8,7 @@ mod port;
 mod random;
 mod reset;
 mod supply;
-mod time;
+pub(super) mod time;
 mod usb;
 mod watchdog;
 
@@ -27,7 +27,6 @@ pub(crate) use pins::PinPort;
 pub(crate) use port::{PortRx, PortTx, halves};
 pub(crate) use random::number as random_number;
 pub(crate) use reset::{reset_cause, restart};
-pub(crate) use time::nap;
 pub(crate) use usb::{begin_with_data0, drop_control_packet, frame_number, has_bus_event};
 
 use crate::boards::machine::SYSTICK_RELOAD;
