@@ -6,7 +6,7 @@
 //! as one by hand. A plugged cable never starts the mode: a charger in the field must not stop a recording.
 //!
 //! There is no executor. The disk's server polls the USB stack while it waits, also for a block of the card, and sleeps until the
-//! next interrupt when it has nothing to do. The identification of a card blocks it for 8 s at most; [`watch`] feeds the watchdog
+//! next interrupt while it waits for a command. The identification of a card blocks it for 8 s at most; [`watch`] feeds the watchdog
 //! meanwhile.
 
 use core::future::{Future as _, poll_fn};

@@ -157,13 +157,13 @@ impl Alerts {
     pub fn level(&self, now: BootMs, cause: Cause, in_mishap: bool) -> Option<f32> {
         let told = self.told.get(cause as usize)?;
         let urgency = told.map(|(urgency, _)| urgency);
-        let is_judged = self.armed && !in_mishap;
         let flags = [&self.sensors, &self.failures, &self.estimator];
-        let said = |failed| is_judged && flags.iter().any(|flags| flags.says(now, cause) == Some(failed));
+        let said = flags.iter().filter_map(|flags| flags.says(now, cause)).reduce(|one, other| one | other);
+        let said = said.filter(|_| self.armed && !in_mishap);
         let holds = told.is_some_and(|(_, until)| !now.is_after(until));
         let held = urgency.filter(|urgency| *urgency != Urgency::Over && holds);
-        let wrong = held.max(said(true).then_some(Urgency::Warning));
-        let is_over = urgency == Some(Urgency::Over) || said(false);
+        let wrong = held.max((said == Some(true)).then_some(Urgency::Warning));
+        let is_over = urgency == Some(Urgency::Over) || said == Some(false);
         let good = if is_over { f32::from(Urgency::Over as u8) } else { ENDED };
         // Once flags were received each cause has a level.
         let was_said = told.is_some() || flags.iter().any(|flags| flags.at.is_set());

@@ -6,7 +6,7 @@
 //! ```
 //! The server is plain code that waits for the card and for room. All waits call the rest of the program (`meanwhile`), the
 //! bus among it. So the card is read while the bus sends. Until the next command comes, the server reads the blocks behind the
-//! last ones into a free chunk. With nothing to do it sleeps (`idle`).
+//! last ones into a free chunk, and sleeps (`idle`).
 
 use core::cell::Cell;
 
@@ -174,7 +174,6 @@ impl<'a, 'b> Server<'a, 'b> {
             if let Some(found) = look(self) {
                 return Ok(found);
             }
-            (self.idle)();
         }
     }
 }
