@@ -708,7 +708,7 @@ fn does_anything_and_attaches(rig: &mut Rig) {
 }
 
 #[test]
-#[ignore = "ten minutes of a busy processor: `cargo xtask prove chip`"]
+#[ignore = "ten minutes in the model's time: `cargo xtask prove chip`"]
 fn ten_minutes_after_the_cable_was_pulled_the_board_records_again() {
     let (mut rig, resets) = reading();
     use_host(&mut rig, 60 * SECOND, |bus| Disk::attach(bus)?.blocks());

@@ -19,7 +19,7 @@
 //!   one that fits ([`order`]); if none fits, its cause does not count. A waiting mild finding that began with the
 //!   mishap or after it is a consequence, and is dropped.
 //! * A recovering finding waits until it is over or bad again, so a delayed text is true when sent. The text of some checks waits until
-//!   they were bad for a while (`Check::told_after_s`).
+//!   they were bad for a while (`Check::told_after_s`). Of some checks only critical findings are sent (`Check::RECORDED`).
 //! * The end of a finding is sent only if the finding was sent and its explanation has ended. Missing data are
 //!   reported only while no alarm is open.
 //! * Findings that are not critical wait during an event with a critical text. At most [`MILD_MAX`] of them are sent
