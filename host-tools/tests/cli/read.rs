@@ -71,7 +71,7 @@ fn what_has_no_frame_is_not_packed() {
     let dir = tempfile::tempdir().expect("directory");
     fs::write(dir.path().join("text"), "no frame in here\n".repeat(500)).expect("written");
     let output = run(dir.path(), "decode --format hum text -o out.hum", 1);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("no MAVLink frame"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("is neither a log of HUMS"));
     assert!(!dir.path().join("out.hum").exists());
     let frame = &fs::read(px4()).expect("a recording")[8..];
     fs::write(dir.path().join("log.bin"), [&[0xa3, 0x95, 128, 128, 89][..], b"FMT\0BBnNZ", frame].concat())

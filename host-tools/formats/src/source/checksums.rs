@@ -58,16 +58,12 @@ impl Checksums {
         Frame::again(bytes, Check::Unverified)
     }
 
-    /// Damaged frames.
-    pub const fn damaged(&self) -> u64 {
-        self.damaged
-    }
-
     /// Damage as gap.
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
-        let words = wrong_checksums(self.damaged);
-        Some(Gap::damaged(at, place, words))
+        let gap = Gap::damaged(at, place, wrong_checksums(self.damaged));
+        let own = hums_blackbox::Gap { frames: u32::try_from(self.damaged).ok(), ..gap.to_own() };
+        Some(Gap { own: Some(own), ..gap })
     }
 
     /// A sentence.

@@ -62,6 +62,7 @@ pub mod ulog;
 pub use said::parameter;
 pub use stream::{Chunk, Source};
 
+use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -153,7 +154,7 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
 }
 
 /// The error for a command that writes frames.
-pub fn no_frame(input: &Endpoint) -> Error {
+pub fn no_frame(input: impl Display) -> Error {
     anyhow!("{input}: has no MAVLink frame, so nothing was written; hums check says what a file is")
 }
 

@@ -21,19 +21,9 @@ pub trait Source: Send {
         None
     }
 
-    /// Microseconds since 1970, if the input has it (after the first chunk).
-    fn utc_start_us(&self) -> Option<u64> {
-        self.inner()?.utc_start_us()
-    }
-
     /// A chunk is a record (a tlog's frame).
     fn has_records(&self) -> bool {
         self.inner().is_some_and(Source::has_records)
-    }
-
-    /// Another recording begins with the last chunk.
-    fn begins_another(&self) -> bool {
-        self.inner().is_some_and(Source::begins_another)
     }
 
     /// Complete after the end.

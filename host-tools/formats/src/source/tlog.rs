@@ -6,7 +6,7 @@ pub mod times;
 use std::io::{self, Read};
 
 use self::records::{Record, Records, TIME_BYTES};
-use self::times::{Begins, Times};
+use self::times::Times;
 use super::stream::{Chunk, Source};
 use crate::plural::count;
 
@@ -17,9 +17,6 @@ pub struct Tlog<R> {
     place: u64,
     noise_bytes: u64,
     jumps: u64,
-    utc_start_us: Option<u64>,
-    /// Another recording began with the latest record.
-    begins: bool,
     damages: u64,
     ended: bool,
 }
@@ -42,8 +39,6 @@ impl<R: Read> Tlog<R> {
             place: 0,
             noise_bytes: 0,
             jumps: 0,
-            utc_start_us: None,
-            begins: false,
             damages: 0,
             ended: false,
         }
@@ -62,9 +57,7 @@ impl<R: Read + Send> Source for Tlog<R> {
             Some(Record::Frame { time_us, bytes }) => {
                 let told = self.times.take(time_us, &bytes, self.place, &self.records);
                 self.place += (TIME_BYTES + bytes.len()) as u64;
-                self.begins = told.begins == Some(Begins::Recording);
                 self.jumps += u64::from(told.begins.is_some());
-                self.utc_start_us = self.utc_start_us.or(told.epoch_us);
                 Some(Chunk { at_us: self.times.now().as_micros(), bytes })
             }
             Some(Record::Noise(bytes)) => {
@@ -76,16 +69,8 @@ impl<R: Read + Send> Source for Tlog<R> {
         })
     }
 
-    fn utc_start_us(&self) -> Option<u64> {
-        self.utc_start_us
-    }
-
     fn has_records(&self) -> bool {
         true
-    }
-
-    fn begins_another(&self) -> bool {
-        self.begins
     }
 
     fn damages(&self) -> u64 {
