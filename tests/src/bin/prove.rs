@@ -10,7 +10,9 @@ use hums_tests::flights::root;
 use hums_tests::prove::diagnosis::{self, DIAGNOSIS, Flights};
 use hums_tests::prove::fleet::{self, FLEET, Fleet};
 use hums_tests::prove::storage::{self, STORAGE};
-use hums_tests::prove::{CAMPAIGNS, Campaign, Counting, Options, Part, Provenance, write_report};
+use hums_tests::prove::{
+    CAMPAIGNS, Campaign, Counting, Options, Part, Provenance, compare_report, write_report,
+};
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -117,6 +119,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let commit = if is_whole { Some(commit("docs/proof.md")?) } else { None };
     let parts = chosen.into_iter().map(|campaign| prove(campaign, options)).collect::<Result<Vec<_>>>()?;
     if all && options.short {
+        compare_report(&root().join("docs/proof.md"), &parts)?;
         judge(&Flights::short())?;
     }
     if let Some(commit) = commit {

@@ -8,7 +8,7 @@ use hums_blackbox::{Header, Sector};
 use rayon::prelude::*;
 
 use super::card::{BLOCK, Card};
-use super::figures::{Figures, Labels};
+use super::figures::Figures;
 use super::options::Options;
 use super::pages;
 use super::record::Record;
@@ -21,32 +21,9 @@ const SECONDS: f64 = 15.0;
 /// A sector.
 const BURST_BITS_MAX: u64 = 8 * BLOCK as u64;
 
-pub(super) const LABELS: Labels = Labels {
-    facts: &[
-        "bit errors",
-        "single bits",
-        "bursts of 2 to 4096 bits",
-        "noticed",
-        "frames lost",
-        "frames decoded, all correct",
-        "bit errors in memory, before the sector's checksum",
-        "noticed",
-        "without effect",
-        "frames lost by one of them, at most",
-        "frames decoded after them, all correct",
-        "damaged pages and ends",
-        "noticed by `info --verify`",
-        "read as the other session, and reported",
-        "reported as complete up to the named end mark",
-        "rebuilt from parity without a loss, and noticed by `info --verify`",
-        "missed or wrong",
-        "frames decoded after these, all correct",
-    ],
-    columns: &["damage", "cases", "noticed", "reported", "missed", "frames lost, at most"],
-};
-
 pub(super) fn run(options: &Options) -> Result<Figures> {
-    let mut figures = Figures::new(&LABELS);
+    let mut figures =
+        Figures::with(&["damage", "cases", "noticed", "reported", "missed", "frames lost, at most"]);
     bits(options, &mut figures)?;
     whole_pages(options, &mut figures)?;
     Ok(figures)

@@ -9,7 +9,7 @@ use hums::run::sim::both_ports::power_on;
 use hums::source::Chunk;
 
 use super::card::Card;
-use super::figures::{Figures, Labels};
+use super::figures::Figures;
 use super::memory::held_bytes;
 use super::options::Options;
 use super::record::Record;
@@ -35,25 +35,6 @@ const BEHIND_MS_MAX: u64 = 200;
 const KEPT_MIN: f64 = 0.8;
 /// Bytes since the second look: the list of looks, a file's name.
 const GROWTH_BYTES_MAX: usize = 64 << 10;
-
-pub(super) const LABELS: Labels = Labels {
-    facts: &[
-        "simulated hours",
-        "frames",
-        "frames lost",
-        "MAVLink, MB",
-        "log, MB",
-        "segments",
-        "segments that replaced an older one",
-        "block writes of the log, commands",
-        "inspections of the card",
-        "newest data on the card, minutes, at least",
-        "delay from line to card, ms, at most",
-        "bytes allocated at the second inspection, and at most later",
-        "`fsck.vfat -n` at the end",
-    ],
-    columns: &[],
-};
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let form = if options.short { &SHORT } else { &LONG };
@@ -81,7 +62,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let late = seen.iter().skip(2).map(|about| about.held_bytes).max().unwrap_or(early);
     ensure!(late <= early + GROWTH_BYTES_MAX, "memory grew from {early} to {late} bytes");
 
-    let mut figures = Figures::new(&LABELS);
+    let mut figures = Figures::default();
     figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
     figures.fact("frames", done.stats.frames_in);
     figures.fact("frames lost", done.stats.frames_lost);

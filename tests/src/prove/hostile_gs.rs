@@ -17,7 +17,7 @@ use hums_link::signing::{Clock, Key, Seal};
 use hums_recorder::{Buffers, CardStatus};
 
 use super::card::Card;
-use super::figures::{Figures, Labels};
+use super::figures::Figures;
 use super::options::Options;
 use super::record::Record;
 use super::stream::{FULL_RATE, Stream};
@@ -45,65 +45,16 @@ const OWN_IDS: [u32; 4] = [0, 20, 66, 76];
 const OWN_COMMANDS: [u16; 2] = [511, 512];
 const COMPONENT: u8 = 191;
 
-pub(super) const LABELS: Labels = Labels {
-    facts: &[
-        "simulated hours",
-        "without a key: hostile bytes, MB",
-        "without a key: frames of the vehicle, and lost",
-        "without a key: bytes to the ground station in a second: most, budget",
-        "without a key: bytes to the autopilot in a second: most, budget",
-        "without a key: frames to the autopilot, and the box's own of them",
-        "without a key: parameters changed",
-        "without a key: earlier logs, marks as erased, unreadable",
-        "without a key: sector queue: most, size",
-        "with a key: hostile bytes, MB",
-        "with a key: frames of the vehicle, and lost",
-        "with a key: bytes to the ground station in a second: most, budget",
-        "with a key: bytes to the autopilot in a second: most, budget",
-        "with a key: frames to the autopilot, and the box's own of them",
-        "with a key: parameters changed",
-        "with a key: earlier logs, marks as erased, unreadable",
-        "with a key: sector queue: most, size",
-    ],
-    columns: &[],
-};
-
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let seconds = options.runs(24 * 3600, 120);
-    let mut figures = Figures::new(&LABELS);
+    let mut figures = Figures::with(&["in half of these hours each", "without a key", "with a key"]);
     figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
     // Half of the time the key is needed.
-    for (name, key) in [("without a key", None), ("with a key", Some(KEY))] {
-        let half = attack(options, seconds / 2, key).with_context(|| name.to_owned())?;
-        figures.fact(format!("{name}: hostile bytes, MB"), format!("{:.1}", half.hostile_bytes as f64 / 1e6));
-        figures.fact(
-            format!("{name}: frames of the vehicle, and lost"),
-            format!("{}, {}", half.outcome.done.stats.frames_in, half.outcome.done.stats.frames_lost),
-        );
-        figures.fact(
-            format!("{name}: bytes to the ground station in a second: most, budget"),
-            format!("{}, {}", half.fullest, half.budget),
-        );
-        figures.fact(
-            format!("{name}: bytes to the autopilot in a second: most, budget"),
-            format!("{}, {}", half.to_autopilot.window.fullest, half.autopilot_budget),
-        );
-        figures.fact(
-            format!("{name}: frames to the autopilot, and the box's own of them"),
-            format!("{}, {}", half.to_autopilot.frames, half.to_autopilot.own),
-        );
-        figures.fact(format!("{name}: parameters changed"), half.changed);
-        figures.fact(
-            format!("{name}: earlier logs, marks as erased, unreadable"),
-            format!("{EARLIER}, {}, 0", half.erased),
-        );
-        figures.fact(
-            format!("{name}: sector queue: most, size"),
-            format!(
-                "{}, {}",
-                half.outcome.done.stats.queue_bytes_max, half.outcome.done.stats.queue_bytes_capacity
-            ),
-        );
+    let [without, with] = [("without a key", None), ("with a key", Some(KEY))].map(|(name, key)| {
+        attack(options, seconds / 2, key).with_context(|| name.to_owned()).map(Half::figures)
+    });
+    for ((what, without), (_, with)) in without?.into_iter().zip(with?) {
+        figures.row(&[&what, &without, &with]);
     }
     Ok(figures)
 }
@@ -219,6 +170,29 @@ fn params(keyed: bool) -> Result<Params> {
 }
 
 impl Half {
+    fn figures(self) -> [(&'static str, String); 8] {
+        let Self {
+            changed, erased, fullest, budget, to_autopilot: ToAutopilot { window, frames, own }, ..
+        } = &self;
+        let stats = self.outcome.done.stats;
+        [
+            ("hostile bytes, MB", format!("{:.1}", self.hostile_bytes as f64 / 1e6)),
+            ("frames of the vehicle, and lost", format!("{}, {}", stats.frames_in, stats.frames_lost)),
+            ("bytes to the ground station in a second: most, budget", format!("{fullest}, {budget}")),
+            (
+                "bytes to the autopilot in a second: most, budget",
+                format!("{}, {}", window.fullest, self.autopilot_budget),
+            ),
+            ("frames to the autopilot, and the box's own of them", format!("{frames}, {own}")),
+            ("parameters changed", changed.to_string()),
+            ("earlier logs, marks as erased, unreadable", format!("{EARLIER}, {erased}, 0")),
+            (
+                "sector queue: most, size",
+                format!("{}, {}", stats.queue_bytes_max, stats.queue_bytes_capacity),
+            ),
+        ]
+    }
+
     fn judge(&self) -> Result<()> {
         let (stats, left) = (self.outcome.done.stats, self.outcome.done.frames_left);
         ensure!(

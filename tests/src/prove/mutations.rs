@@ -4,7 +4,7 @@ use anyhow::{Context as _, Result, bail};
 use hums_fuzz::{TARGETS, Target, mutate};
 use rayon::prelude::*;
 
-use super::figures::{Figures, Labels};
+use super::figures::Figures;
 use super::options::Options;
 
 /// Times the test's inputs, which take half a second a target.
@@ -12,23 +12,18 @@ const LONG: u64 = 400;
 /// Part of the test's inputs.
 const SHORT: u64 = 5;
 
-pub(super) const LABELS: Labels = Labels {
-    facts: &["readers", "inputs tried", "inputs that broke a rule"],
-    columns: &["reader", "inputs"],
-};
-
 pub(super) fn run(options: &Options) -> Result<Figures> {
     // The test has 1.
     let seed = options.seed.wrapping_add(1);
     let outcomes = TARGETS.par_iter().with_max_len(1).map(|target| try_often(target, options, seed));
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
-    let mut figures = Figures::new(&LABELS);
+    let mut figures = Figures::with(&["reader", "inputs"]);
     figures.fact("readers", outcomes.len());
     figures.fact("inputs tried", outcomes.iter().sum::<u64>());
     // The first one ends the campaign.
     figures.fact("inputs that broke a rule", 0);
     for (target, tried) in TARGETS.iter().zip(outcomes) {
-        figures.row([target.name.to_owned(), tried.to_string()]);
+        figures.row(&[&target.name, &tried]);
     }
     Ok(figures)
 }

@@ -5,7 +5,7 @@ use hums::logs::on_card;
 use rayon::prelude::*;
 
 use super::card::Card;
-use super::figures::{Figures, Labels};
+use super::figures::Figures;
 use super::options::Options;
 use super::record::Record;
 use super::stream::{Stream, hash};
@@ -20,18 +20,6 @@ const HIDDEN_MAX: usize = 16;
 /// Two causes, each with a chance of 1 in 65,536: a damaged frame whose checksum fits, and a damaged header that
 /// makes a candidate within a frame.
 const INVENTED_MAX: f64 = 1.0 / 2_000.0;
-
-pub(super) const LABELS: Labels = Labels {
-    facts: &["runs", "frames", "undamaged frames that were not recorded"],
-    columns: &[
-        "probability for a byte",
-        "frames",
-        "damaged",
-        "undamaged, recorded",
-        "undamaged, under a false frame",
-        "damaged, checksum fits by chance",
-    ],
-};
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let rounds = options.runs(8, 1);
@@ -51,7 +39,14 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
         record(stream, *probability, seed).map(|outcome| (*probability, outcome))
     });
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
-    let mut figures = Figures::new(&LABELS);
+    let mut figures = Figures::with(&[
+        "probability for a byte",
+        "frames",
+        "damaged",
+        "undamaged, recorded",
+        "undamaged, under a false frame",
+        "damaged, checksum fits by chance",
+    ]);
     figures.fact("runs", outcomes.len());
     figures.fact("frames", outcomes.iter().map(|(_, one)| one.frames).sum::<u64>());
     figures.fact(
@@ -61,16 +56,12 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     for probability in PROBABILITIES {
         let of = |figure: fn(&Outcome) -> u64| {
             let these = outcomes.iter().filter(|(this, _)| this.to_bits() == probability.to_bits());
-            these.map(|(_, one)| figure(one)).sum::<u64>().to_string()
+            these.map(|(_, one)| figure(one)).sum::<u64>()
         };
-        figures.row([
-            probability.to_string(),
-            of(|one| one.frames),
-            of(|one| one.frames - one.whole),
-            of(|one| one.whole - one.missing),
-            of(|one| one.missing),
-            of(|one| one.invented),
-        ]);
+        let (damaged, recorded) = (of(|one| one.frames - one.whole), of(|one| one.whole - one.missing));
+        let [frames, missing, invented] =
+            [of(|one| one.frames), of(|one| one.missing), of(|one| one.invented)];
+        figures.row(&[&probability, &frames, &damaged, &recorded, &missing, &invented]);
     }
     Ok(figures)
 }

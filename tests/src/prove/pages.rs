@@ -127,10 +127,7 @@ impl Tally {
             let mut sum = Self::default();
             of(kind).for_each(|one| sum.add(one));
             all.add(&sum);
-            let numbers =
-                [sum.damages, sum.noticed, sum.told, sum.missed, sum.lost_max].map(|one| one.to_string());
-            let [damages, noticed, told, missed, lost] = numbers;
-            figures.row([name.to_owned(), damages, noticed, told, missed, lost]);
+            figures.row(&[&name, &sum.damages, &sum.noticed, &sum.told, &sum.missed, &sum.lost_max]);
         }
         all
     }

@@ -18,7 +18,7 @@ use hums_blackbox::Cause;
 use rayon::prelude::*;
 
 use super::card::{BLOCK, Card};
-use super::figures::{Figures, Labels};
+use super::figures::Figures;
 use super::options::Options;
 use super::record::Record;
 use super::stream::{FULL_RATE, Stream};
@@ -92,19 +92,6 @@ const SCENARIOS: &[Scenario] = &[
     Scenario { flight: FAULTS, ..RETURN },
 ];
 
-pub(super) const LABELS: Labels = Labels {
-    facts: &[
-        "cuts",
-        "cuts in the middle of a block (torn)",
-        "cuts at the FAT or the directory",
-        "files of earlier sessions compared",
-        "frames decoded, all correct",
-        "largest loss by a cut, ms (200 allowed)",
-        "largest loss before the log began, ms (300 allowed)",
-    ],
-    columns: &["scenario", "flight", "block writes", "cuts", "torn", "worst ms"],
-};
-
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let runs = options.runs(10_000, 96);
     let share = runs.div_ceil(SCENARIOS.len() as u64);
@@ -118,7 +105,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     });
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
     let sum = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
-    let mut figures = Figures::new(&LABELS);
+    let mut figures = Figures::with(&["scenario", "flight", "block writes", "cuts", "torn", "worst ms"]);
     figures.fact("cuts", sum(|one| one.cuts));
     figures.fact("cuts in the middle of a block (torn)", sum(|one| one.torn));
     figures.fact("cuts at the FAT or the directory", sum(|one| one.metadata));
@@ -131,14 +118,8 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     for (one, scenario) in
         outcomes.iter().zip(SCENARIOS.iter().filter(|one| !options.short || one.seconds < 60.0))
     {
-        figures.row([
-            scenario.name.to_owned(),
-            scenario.flight.to_owned(),
-            one.writes.to_string(),
-            one.cuts.to_string(),
-            one.torn.to_string(),
-            (one.loss_us_max / 1000).to_string(),
-        ]);
+        let worst_ms = one.loss_us_max / 1000;
+        figures.row(&[&scenario.name, &scenario.flight, &one.writes, &one.cuts, &one.torn, &worst_ms]);
     }
     Ok(figures)
 }

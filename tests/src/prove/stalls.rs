@@ -9,7 +9,7 @@ use hums_blackbox::record::Stats;
 use rayon::prelude::*;
 
 use super::card::Card;
-use super::figures::{Figures, Labels};
+use super::figures::Figures;
 use super::options::Options;
 use super::stream::{FULL_RATE, Stream};
 use crate::flights::{OWN, more, own};
@@ -19,11 +19,6 @@ const STALLS_AT_S: [u64; 7] = [5, 2, 3, 4, 6, 7, 8];
 const STALL_MS: u64 = 2_500;
 /// Seconds; shorter recordings are repeated.
 const SECONDS_MIN: f64 = 12.0;
-
-pub(super) const LABELS: Labels = Labels {
-    facts: &["unsigned recordings", "one stall of 2.5 s a run, from second", "frames", "frames lost"],
-    columns: &["recording", "seconds", "frames", "lost, at most", "queue, at most", "queue size"],
-};
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let further = if options.short { Vec::new() } else { more() };
@@ -44,21 +39,18 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let lossy: Vec<_> =
         outcomes.iter().filter(is_lossy).map(|(name, _, stats)| (name, stats.frames_lost)).collect();
     ensure!(lossy.is_empty(), "frames lost of {} of {} recordings: {lossy:?}", lossy.len(), outcomes.len());
-    let mut figures = Figures::new(&LABELS);
+    let mut figures =
+        Figures::with(&["recording", "seconds", "frames", "lost, at most", "queue, at most", "queue size"]);
     let unsigned: Vec<_> = outcomes.iter().filter(|(_, stream, _)| !stream.is_signed).collect();
     figures.fact("unsigned recordings", unsigned.len());
     figures.fact("one stall of 2.5 s a run, from second", seconds_of(moments));
     figures.fact("frames", unsigned.iter().map(|(.., stats)| stats.frames_in).sum::<u64>());
     figures.fact("frames lost", unsigned.iter().map(|(.., stats)| stats.frames_lost).sum::<u64>());
     for (name, stream, stats) in &outcomes {
-        figures.row([
-            if stream.is_signed { format!("{name} (signed)") } else { name.clone() },
-            format!("{:.1}", stream.seconds()),
-            stats.frames_in.to_string(),
-            stats.frames_lost.to_string(),
-            stats.queue_bytes_max.to_string(),
-            stats.queue_bytes_capacity.to_string(),
-        ]);
+        let name = if stream.is_signed { format!("{name} (signed)") } else { name.clone() };
+        let seconds = format!("{:.1}", stream.seconds());
+        let (lost, queued, size) = (stats.frames_lost, stats.queue_bytes_max, stats.queue_bytes_capacity);
+        figures.row(&[&name, &seconds, &stats.frames_in, &lost, &queued, &size]);
     }
     Ok(figures)
 }

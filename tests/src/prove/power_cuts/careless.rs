@@ -10,6 +10,7 @@
 //! it again.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
 
 use anyhow::{Context as _, Result, ensure};
 use hums::ending::SessionBefore;
@@ -26,7 +27,7 @@ use rayon::prelude::*;
 use super::{BLOCK, FULL, GUIDED, LATER, NEW_CARD, PX4, Scenario, Session};
 use crate::damage::Random;
 use crate::flights::own;
-use crate::prove::figures::{Figures, Labels};
+use crate::prove::figures::Figures;
 use crate::prove::options::Options;
 use crate::prove::record::Record;
 use crate::prove::stream::{FULL_RATE, Stream};
@@ -51,31 +52,19 @@ const SCENARIOS: &[Scenario] = &[
 const NOTES_MAX: usize = 40;
 const SCENARIOS_SHORT: usize = 2;
 
-pub(in crate::prove) const LABELS: Labels = Labels {
-    facts: &[
-        "cuts",
-        "cards with complaints of `fsck.vfat`",
-        "cards with sectors of earlier sessions spoiled by the cut",
-        "cards that lost part of an earlier session, and how many without a report",
-        "frames of earlier sessions lost outside spoiled groups",
-        "next power-on: recorded completely",
-        "next power-on: not recorded, and the box reports why",
-        "next power-on: sectors of the session before overwritten, because the oldest file's new name was lost",
-        "next power-on: other readable sectors of earlier sessions overwritten",
-    ],
-    columns: &[
-        "card fault",
-        "cuts",
-        "fsck complains",
-        "spoiled",
-        "with loss",
-        "not reported",
-        "next recorded",
-        "next reported",
-        "name lost",
-        "overwritten",
-    ],
-};
+const COLUMNS: [&str; 11] = [
+    "card fault",
+    "cuts",
+    "`fsck.vfat` complains",
+    "sectors of earlier sessions spoiled",
+    "part of an earlier session lost",
+    "of these without a report",
+    "frames lost outside spoiled groups",
+    "next power-on: recorded completely",
+    "not recorded, and the box reports why",
+    "sectors of the session before overwritten: the oldest file's new name was lost",
+    "other readable sectors of earlier sessions overwritten",
+];
 
 pub(in crate::prove) fn run(options: &Options) -> Result<Figures> {
     let scenarios = if options.short { &SCENARIOS[..SCENARIOS_SHORT] } else { SCENARIOS };
@@ -85,49 +74,29 @@ pub(in crate::prove) fn run(options: &Options) -> Result<Figures> {
         let seed = options.seed.wrapping_add(index as u64);
         Subject::record(scenario).and_then(|subject| subject.cut_often(share, seed)).with_context(what)
     });
-    let mut tallies = [Tally::default(); Fault::ALL.len()];
-    let mut notes = Vec::new();
+    let (mut counts, mut notes) = ([[0; COLUMNS.len() - 1]; Fault::ALL.len() + 1], Vec::new());
     for outcome in outcomes.collect::<Result<Vec<_>>>()? {
-        tallies.iter_mut().zip(outcome.tallies).for_each(|(sum, one)| sum.add(&one));
+        for (fault, tally) in outcome.tallies.iter().enumerate() {
+            for (column, number) in tally.numbers().into_iter().enumerate() {
+                counts[fault][column] += number;
+                counts[Fault::ALL.len()][column] += number;
+            }
+        }
         notes.extend(outcome.notes);
     }
     notes.iter().take(NOTES_MAX).for_each(|note| eprintln!("careless-cards: {note}"));
-    let mut all = Tally::default();
-    for one in &tallies {
-        all.add(one);
+    let mut figures = Figures::with(&COLUMNS);
+    for (name, counts) in Fault::ALL.map(Fault::name).iter().chain(&["all"]).zip(&counts) {
+        let cells: Vec<&dyn Display> =
+            std::iter::once(name as &dyn Display).chain(counts.iter().map(|count| count as _)).collect();
+        figures.row(&cells);
     }
-    let mut figures = Figures::new(&LABELS);
-    let [cuts, complaints, spoiled, less, beyond, recorded, said_why, renamed, over] = LABELS.facts else {
-        unreachable!("nine facts")
-    };
-    figures.fact(cuts, all.cuts);
-    figures.fact(complaints, all.complaints);
-    figures.fact(spoiled, all.spoiled);
-    figures.fact(less, format!("{}, {}", all.less, all.untold));
-    figures.fact(beyond, all.beyond);
-    figures.fact(recorded, all.recorded);
-    figures.fact(said_why, all.said_why);
-    figures.fact(renamed, all.name_lost);
-    figures.fact(over, all.written_over);
-    for (fault, one) in Fault::ALL.iter().zip(&tallies) {
-        figures.row([
-            fault.name().to_owned(),
-            one.cuts.to_string(),
-            one.complaints.to_string(),
-            one.spoiled.to_string(),
-            one.less.to_string(),
-            one.untold.to_string(),
-            one.recorded.to_string(),
-            one.said_why.to_string(),
-            one.name_lost.to_string(),
-            one.written_over.to_string(),
-        ]);
-    }
-    ensure!(all.beyond == 0, "more was lost than was spoiled:\n{}", figures.text());
-    ensure!(all.untold == 0, "earlier sessions lost something and nothing tells:\n{}", figures.text());
+    let [.., untold, beyond, _, _, _, written_over] = counts[Fault::ALL.len()];
+    ensure!(beyond == 0, "more was lost than was spoiled:\n{}", figures.text());
+    ensure!(untold == 0, "earlier sessions lost something and nothing tells:\n{}", figures.text());
     // Rarely the recorder cannot know: see docs/cards.md.
     ensure!(
-        !options.short || all.written_over == 0,
+        !options.short || written_over == 0,
         "the next power-on wrote over earlier sessions:\n{}",
         figures.text()
     );
@@ -177,17 +146,11 @@ struct Tally {
 }
 
 impl Tally {
-    fn add(&mut self, other: &Self) {
-        self.cuts += other.cuts;
-        self.complaints += other.complaints;
-        self.spoiled += other.spoiled;
-        self.less += other.less;
-        self.untold += other.untold;
-        self.beyond += other.beyond;
-        self.recorded += other.recorded;
-        self.said_why += other.said_why;
-        self.name_lost += other.name_lost;
-        self.written_over += other.written_over;
+    /// In the order of the columns.
+    fn numbers(&self) -> [u64; COLUMNS.len() - 1] {
+        let Self { cuts, complaints, spoiled, less, untold, beyond, .. } = *self;
+        let Self { recorded, said_why, name_lost, written_over, .. } = *self;
+        [cuts, complaints, spoiled, less, untold, beyond, recorded, said_why, name_lost, written_over]
     }
 }
 
