@@ -123,10 +123,18 @@ fn a_damaged_store_is_told_and_one_that_cannot_be_read_is_refused_and_stays() {
     for at in [0, 16_384] {
         damaged[at..at + 64].fill(0);
     }
-    fs::write(&store, &damaged).expect("written");
-    let said = run(dir.path(), &format!("{sim} --overwrite-oldest"), 1);
-    assert!(String::from_utf8_lossy(&said.stderr).contains("name a new file"));
-    assert!(fs::read(&store).expect("there") == damaged);
+    let (no_store, with_magic) = (vec![0x5A; 32_768], [&b"2TSH"[..], &vec![0x5A; 32_764]].concat());
+    for (bytes, why) in [
+        (&damaged[..], "name a new file"),
+        (&no_store, "is no store, though it has the length of one"),
+        (&with_magic, "move it away, or name a new file"),
+        (b"too short", "is no store"),
+    ] {
+        fs::write(&store, bytes).expect("written");
+        let said = stderr(&run(dir.path(), &format!("{sim} --overwrite-oldest"), 1));
+        assert!(said.contains(why), "{said}");
+        assert!(fs::read(&store).expect("there") == bytes);
+    }
 }
 
 #[test]

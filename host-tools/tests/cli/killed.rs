@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use crate::support::{
-    all_named, attempt, contents, flight, frames_of, furnished, json, named, px4, run, stderr, until,
+    all_named, attempt, contents, frames_of, furnished, json, named, px4, run, stderr, until,
 };
 
 fn parts(dir: &Path) -> Vec<String> {
@@ -199,20 +199,6 @@ fn what_is_not_whole_in_a_folder_is_passed_over_and_told() {
         assert_eq!(said.matches("has not ended, and is passed over").count(), 3, "{line}: {said}");
     }
     assert_eq!(all_named(&dir.path().join("out"), "00001").len(), 1);
-}
-
-#[test]
-fn two_signals_right_after_each_other_end_the_page_in_good_order() {
-    let mut live = Command::new(env!("CARGO_BIN_EXE_hums"));
-    live.args(["live", "--listen", "127.0.0.1:0"]).arg(flight("ap_quad_guided.tlog"));
-    let mut live = live.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
-    // It serves, so it handles signals.
-    let mut said = [0; 1];
-    std::io::Read::read_exact(live.stdout.as_mut().expect("piped"), &mut said).expect("it says where");
-    let twice = format!("kill -INT {0}; kill -INT {0}", live.id());
-    assert!(Command::new("sh").args(["-c", &twice]).status().expect("it runs").success());
-    let ended = live.wait_with_output().expect("it ends");
-    assert_eq!(ended.status.code(), Some(0), "{}", String::from_utf8_lossy(&ended.stderr));
 }
 
 #[test]

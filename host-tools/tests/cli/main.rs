@@ -19,7 +19,6 @@ mod killed;
 mod logbook;
 mod mixed;
 mod pairs;
-mod px4_pair;
 mod read;
 mod record;
 mod replace;

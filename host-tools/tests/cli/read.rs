@@ -252,52 +252,6 @@ fn where_files_go_depends_on_how_many_there_are() {
 }
 
 #[test]
-fn a_bit_flipped_in_any_group_costs_that_group_and_is_told() {
-    let dir = tempfile::tempdir().expect("directory");
-    packed(dir.path());
-    let log = fs::read(dir.path().join("flight.hum")).expect("a log");
-    let clean = frames_of(&px4());
-    for sector in [0, 1, 63, 64, log.len() / 1024, log.len() / 512 - 1] {
-        let mut damaged = log.clone();
-        damaged[sector * 512 + 100] ^= 0x04;
-        fs::write(dir.path().join("bad.hum"), damaged).expect("written");
-        run(dir.path(), "decode bad.hum -o bad --format tlog,csv,jsonl", 3);
-        let made = dir.path().join("bad").join(named(&dir.path().join("bad"), "bad"));
-        let made = |ending: &str| PathBuf::from(format!("{}{ending}", made.display()));
-        let back = frames_of(&made(".tlog"));
-        let group = clean.len() * 64 * 512 / log.len() + 500;
-        assert!(back.len() + group >= clean.len(), "sector {sector}: {} of {}", back.len(), clean.len());
-        let mut rest = clean.iter();
-        assert!(back.iter().all(|frame| rest.any(|other| other == frame)), "sector {sector}: a wrong frame");
-        let read = |ending: &str| fs::read_to_string(made(ending)).expect(ending);
-        assert_eq!(read("/HUMS_GAP.csv").lines().count(), 2, "sector {sector}");
-        assert!(read(".jsonl").contains("HUMS_GAP"), "sector {sector}");
-        let verify = json(&run(dir.path(), "info --verify bad.hum --json", 3));
-        assert_eq!(verify["ok"], false);
-        let info = json(&run(dir.path(), "info bad.hum --json", 3));
-        assert_eq!(info["logs"][0]["gaps_count"], 1, "sector {sector}: {}", info["logs"][0]["gaps"]);
-        fs::remove_dir_all(dir.path().join("bad")).expect("removed");
-    }
-}
-
-#[test]
-fn a_cut_log_gives_what_it_has() {
-    let dir = tempfile::tempdir().expect("directory");
-    packed(dir.path());
-    let log = fs::read(dir.path().join("flight.hum")).expect("a log");
-    for length in [512, 700, 32 * 512, 65 * 512 + 1, log.len() / 2, log.len() - 512] {
-        fs::write(dir.path().join("cut.hum"), &log[..length]).expect("written");
-        for name in ["cut.tlog", "cut.tlog.gaps.csv"] {
-            let _ = fs::remove_file(dir.path().join(name));
-        }
-        run(dir.path(), "decode cut.hum -o cut.tlog --format tlog", 3);
-        let back = frames_of(&dir.path().join("cut.tlog"));
-        assert!(frames_of(&px4()).starts_with(&back), "{length} bytes");
-        assert!(back.len() * 3 > length / 512 * 10, "{length} bytes: {} frames", back.len());
-    }
-}
-
-#[test]
 fn segments_copied_off_a_card_are_a_log() {
     let dir = recorded();
     let image = fs::read(dir.path().join("card.img")).expect("an image");

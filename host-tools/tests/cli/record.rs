@@ -7,14 +7,6 @@ use std::net::{TcpListener, UdpSocket};
 use crate::support::{attempt, end_of, flight, frames_of, hums, json, piped, px4, run, stderr, text};
 
 #[test]
-fn the_tap_shows_what_the_uart_got() {
-    let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), "sim PX4 --sd card.img --tap clean.bin", 0);
-    let clean = fs::read(dir.path().join("clean.bin")).expect("tap");
-    assert_eq!(clean, frames_of(&px4()).concat());
-}
-
-#[test]
 fn the_recorded_times_can_be_ignored() {
     let dir = tempfile::tempdir().expect("directory");
     run(dir.path(), "sim PX4 --sd card.img --line-rate 115200", 0);

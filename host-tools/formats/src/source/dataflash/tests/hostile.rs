@@ -1,11 +1,9 @@
 //! Hostile bytes: no panic, bounded memory, rising time ([`Seen`](super::Seen)).
 
-use proptest::prelude::*;
-
 use super::super::binary::{Binary, Piece, Window};
 use super::super::format::Formats;
+use super::read;
 use super::writer::Writer;
-use super::{detect, read};
 
 fn small() -> Vec<u8> {
     let mut log = Writer::new();
@@ -103,40 +101,4 @@ fn bytes_that_look_like_heads_for_ever_take_no_time() {
     let started = std::time::Instant::now();
     assert!(read(&log.bytes).is_ok());
     assert!(started.elapsed().as_secs() < 20, "{:?}", started.elapsed());
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
-
-    #[test]
-    fn flipped_bits_are_survived(flips in prop::collection::vec((any::<prop::sample::Index>(), 0..8_u8), 1..40)) {
-        let mut log = small();
-        for (place, bit) in flips {
-            let length = log.len();
-            log[place.index(length)] ^= 1 << bit;
-        }
-        prop_assert!(read(&log).is_ok());
-    }
-
-    #[test]
-    fn spliced_and_random_bytes_are_survived(
-        noise in prop::collection::vec(any::<u8>(), 0..600),
-        at in any::<prop::sample::Index>(),
-    ) {
-        let mut log = small();
-        let tail = log.split_off(at.index(log.len()));
-        log.extend(noise);
-        log.extend(tail);
-        prop_assert!(read(&log).is_ok());
-    }
-
-    #[test]
-    fn text_of_any_kind_is_survived(lines in prop::collection::vec("[ -~é]{0,60}", 0..40)) {
-        let log = format!(
-            "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nFMT, 150, 0, ATT, Qccc, TimeUS,Roll,Pitch,Yaw\n\
-             {}\nATT, {}", lines.join("\nATT, "), lines.concat()
-        );
-        detect(log.as_bytes());
-        prop_assert!(read(log.as_bytes()).is_ok());
-    }
 }

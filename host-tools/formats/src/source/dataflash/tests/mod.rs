@@ -1,7 +1,6 @@
 //! Logs as they should be, as old autopilots wrote them, and as no autopilot would.
 
 mod arming;
-mod equality;
 mod estimator;
 mod hostile;
 mod joined;
