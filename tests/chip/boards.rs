@@ -3,14 +3,13 @@
 use hums_boards::{Board, Level};
 use hums_sdcard::{Event, Fault, Kind, Model, Plan};
 use hums_tests::chip::pin;
-use hums_tests::chip::record::Compared;
 use hums_tests::chip::rig::{Bench, Rig};
 use hums_tests::program;
 use stm32f405_model::machine::Board as Parts;
 use stm32f405_model::rcc::Cause;
 use stm32f405_model::time::{MS, SECOND, US};
 
-use super::{bench_of, update, usb};
+use super::{assert_all_recorded, bench_of, update, usb};
 
 const IN_MEMORY_MAX: usize = 700;
 /// Of a card that is busy while frames come at full rate.
@@ -110,8 +109,7 @@ fn a_wrong_crystal_or_chip_is_told_and_the_board_records() {
         let session = rig.sessions().pop().unwrap();
         assert_eq!(session.texts.iter().filter(|told| *told == text).count(), 1, "{:?}", session.texts);
         assert!(session.texts.iter().all(|told| !told.contains("crystal failed")), "{:?}", session.texts);
-        let wanted = Compared { right: rig.sent.len(), ends: (0, 0), ..Compared::default() };
-        assert_eq!(rig.compared(), wanted, "{text}");
+        assert_all_recorded(&rig);
         // Two brief blinks a second.
         let lit = rig.led.iter().filter(|(at, lit)| *at > 3 * SECOND && *lit).count();
         assert!((3..=5).contains(&lit), "{lit} in two seconds");

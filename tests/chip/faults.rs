@@ -1,7 +1,7 @@
 //! Faults of the devices round the processor, each with its expected result.
 
 use hums_tests::chip::BAUD;
-use hums_tests::chip::record::{Compared, Session};
+use hums_tests::chip::record::Session;
 use hums_tests::chip::rig::{Rig, frame, heartbeat, set};
 use stm32f405_model::flash::Speed;
 use stm32f405_model::machine::Board;
@@ -9,16 +9,14 @@ use stm32f405_model::rcc::Cause;
 use stm32f405_model::small::Randomness;
 use stm32f405_model::time::{MS, SECOND};
 
-use super::bench;
+use super::{assert_all_recorded, assert_heard, bench, ready};
 
 /// The low-speed oscillator at its fastest (DS8626, table 36).
 const LSI_FASTEST: u32 = 47_000;
 
 #[track_caller]
 fn assert_whole(rig: &Rig) {
-    let compared = rig.compared();
-    let wanted = Compared { right: rig.sent.len(), ends: (0, 0), ..Compared::default() };
-    assert_eq!(compared, wanted);
+    assert_all_recorded(rig);
     assert!(rig.sent.len() > 500, "{} frames", rig.sent.len());
 }
 
@@ -107,9 +105,7 @@ fn a_crystal_that_never_starts_does_not_keep_it_from_recording() {
 /// 4
 #[test]
 fn a_crystal_that_dies_in_flight_costs_the_frames_of_that_moment() {
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, begin) = ready(Board::default());
     rig.run(begin + SECOND, true).unwrap();
     rig.machine.set_crystal(false);
     rig.run(begin + 2 * SECOND, true).unwrap();
@@ -136,9 +132,7 @@ fn random_numbers_that_never_come_do_not_keep_it_from_recording() {
 /// 7
 #[test]
 fn transmitters_that_stand_still_are_told_and_cost_nothing() {
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, begin) = ready(Board::default());
     rig.run(begin + 300 * MS, true).unwrap();
     for port in [0, 1] {
         rig.machine.chip.usarts[port].is_stuck = true;
@@ -154,9 +148,7 @@ fn transmitters_that_stand_still_are_told_and_cost_nothing() {
 #[test]
 fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
     const FAILED: &str = "HUMS: saving failed, have the board replaced";
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, _) = ready(Board::default());
     let set = |rig: &mut Rig, value: f32| {
         let now = rig.machine.now();
         let end = rig.machine.send(0, &heartbeat(1), now, BAUD);
@@ -179,15 +171,12 @@ fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
     let saved = set(&mut rig, 42.0);
     assert!(saved > refused, "{refused} words, and then {saved}");
     assert_no_reset(&rig);
-    let heard: Vec<u8> = rig.machine.take_sent(1).into_iter().map(|(_, byte)| byte).collect();
-    assert!(String::from_utf8_lossy(&heard).contains("HUMS: saving failed"), "the ground was not told");
+    assert_heard(&mut rig, "HUMS: saving failed");
 }
 
 #[test]
 fn a_change_of_a_ports_rate_cuts_no_byte() {
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, _) = ready(Board::default());
     let mut baud = 57_600.0;
     for next in [38_400.0, 115_200.0, 19_200.0, 57_600.0] {
         let now = rig.machine.now();
@@ -207,9 +196,7 @@ fn a_change_of_a_ports_rate_cuts_no_byte() {
 
 #[test]
 fn beginnings_without_a_frame_at_full_rate_starve_nobody() {
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, _) = ready(Board::default());
     for pattern in [[0xFE; 5], [0xFD, 0xFF, 0, 0, 0]] {
         let now = rig.machine.now();
         let end = rig.machine.send(0, &pattern.repeat(28_000), now, BAUD);
@@ -226,9 +213,7 @@ fn beginnings_without_a_frame_at_full_rate_starve_nobody() {
 #[test]
 fn more_frames_than_the_processor_can_take_are_lost_and_counted() {
     const ESC_STATUS: (u32, u8) = (291, 10);
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, begin) = ready(Board::default());
     let art = &mut rig.machine.chip.art;
     let (latency, prefetch) = (art.latency, art.prefetch);
     art.set_caches(false, false);

@@ -19,7 +19,7 @@ use serde_json::Value;
 use stm32f405_model::machine::Board;
 use stm32f405_model::time::SECOND;
 
-use super::bench;
+use super::ready;
 
 const BUSY_PERCENT_MAX: f64 = 40.0;
 /// Prefetch, both caches, five wait states.
@@ -325,9 +325,7 @@ fn every_further_recording_leaves_the_record_that_this_pc_makes_of_it() {
 
 #[test]
 fn the_full_line_rate_is_recorded_without_loss() {
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, begin) = ready(Board::default());
     let mut worst = 0.0_f64;
     for second in 1..=4 {
         let before = (rig.machine.core.cycles(), rig.machine.core.slept());

@@ -14,8 +14,8 @@ use stm32f405_model::machine::{Board, Machine};
 use stm32f405_model::rcc::Cause;
 use stm32f405_model::time::{MS, Ps, SECOND, US};
 
-use super::bench;
 use super::flights::assert_verifies;
+use super::{bench, ready};
 
 /// Milliseconds.
 const OFF_MS_MAX: u64 = 2;
@@ -165,9 +165,7 @@ fn assert_recorded(session: &Session, flight: &Flight, ended: &[Ps]) {
 #[ignore = "an hour in the model's time (cargo xtask prove chip)"]
 fn the_records_time_is_the_senders_for_an_hour_with_ten_erases() {
     const ROUND: Ps = 360 * SECOND;
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, begin) = ready(Board::default());
     for round in 1..=10 {
         while rig.machine.chip.flash.erases.len() < round {
             rig.fill().unwrap();

@@ -15,7 +15,7 @@ use stm32f405_model::machine::Board;
 use stm32f405_model::report::Report;
 use stm32f405_model::time::{MS, Ps, SECOND};
 
-use super::bench;
+use super::ready;
 
 #[derive(Debug, Default)]
 struct Read {
@@ -72,9 +72,7 @@ struct Outcome {
 }
 
 fn flipped(part: &str, most: u64, apart: Ps, seed: u64) -> Outcome {
-    let mut rig = bench().settled(Board { seed, ..Board::default() }).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, _) = ready(Board { seed, ..Board::default() });
     let mut flips = 0;
     let stopped = flip(&mut rig, part, most, apart, &mut Random::new(seed), &mut flips).err();
     let dir = tempfile::tempdir().unwrap();

@@ -2,13 +2,12 @@
 
 use hums_sdcard::{Fault, Plan};
 use hums_tests::chip::BAUD;
-use hums_tests::chip::record::Compared;
 use hums_tests::chip::rig::Rig;
 use stm32f405_model::line::{Char, Flaw, chars};
 use stm32f405_model::machine::Board;
 use stm32f405_model::time::{MS, SECOND, US};
 
-use super::bench;
+use super::{assert_all_recorded, assert_heard, bench, ready};
 
 const IN_MEMORY_MAX: usize = 700;
 
@@ -52,8 +51,7 @@ fn power_that_goes_in_an_erase_of_the_store_leaves_a_board_that_records() {
         rig.run(begin, false).unwrap();
         rig.run(begin + 500 * MS, true).unwrap();
         rig.run(begin + 1_500 * MS, false).unwrap();
-        let wanted = Compared { right: rig.sent.len(), ends: (0, 0), ..Compared::default() };
-        assert_eq!(rig.compared(), wanted, "{part} ms");
+        assert_all_recorded(&rig);
     }
 }
 
@@ -65,8 +63,7 @@ fn a_card_that_stands_still_for_two_and_a_half_seconds_costs_nothing() {
     rig.run(1_500 * MS, false).unwrap();
     rig.run(7_000 * MS, true).unwrap();
     rig.run(10_500 * MS, false).unwrap();
-    let wanted = Compared { right: rig.sent.len(), ends: (0, 0), ..Compared::default() };
-    assert_eq!(rig.compared(), wanted);
+    assert_all_recorded(&rig);
     assert!(rig.slot.violations().is_empty(), "{:?}", rig.slot.violations());
     let session = rig.sessions().pop().unwrap();
     assert!(session.losses.is_empty(), "{:?}", session.losses);
@@ -74,9 +71,7 @@ fn a_card_that_stands_still_for_two_and_a_half_seconds_costs_nothing() {
 
 #[test]
 fn a_supply_that_sags_is_survived_recorded_and_told() {
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, begin) = ready(Board::default());
     rig.run(begin + 500 * MS, true).unwrap();
     rig.machine.take_sent(1);
     let resets = rig.machine.resets.len();
@@ -90,17 +85,14 @@ fn a_supply_that_sags_is_survived_recorded_and_told() {
     assert!(session.frames.len() > 500, "{} frames after it", session.frames.len());
     let texts = &session.texts;
     assert!(texts.iter().any(|text| text.starts_with("fault: below 2.7 V in ")), "{texts:#?}");
-    let heard: Vec<u8> = rig.machine.take_sent(1).into_iter().map(|(_, byte)| byte).collect();
-    assert!(String::from_utf8_lossy(&heard).contains("HUMS: restarted after: supply low"));
+    assert_heard(&mut rig, "HUMS: restarted after: supply low");
     let compared = rig.compared();
     assert!(compared.wrong == 0 && compared.missing < 1_950 + IN_MEMORY_MAX, "{compared:?}");
 }
 
 #[test]
 fn a_noisy_line_costs_the_frames_that_it_damaged() {
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, begin) = ready(Board::default());
     let frames = bench().frames;
     let (mut free, mut damaged) = (begin, 0);
     for (number, frame) in frames.iter().take(1_500).enumerate() {

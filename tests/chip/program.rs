@@ -4,9 +4,9 @@ use hums_tests::chip::rig::Rig;
 use stm32f405_model::machine::Board;
 use stm32f405_model::memory::CCM;
 use stm32f405_model::rcc::Cause;
-use stm32f405_model::time::{MS, SECOND};
+use stm32f405_model::time::MS;
 
-use super::bench;
+use super::{assert_heard, ready};
 
 /// The tasks' handlers, by their names in the vector table.
 const RECEPTION: &str = "CAN1_TX";
@@ -36,9 +36,7 @@ struct Expected<'a> {
 }
 
 fn flying() -> Rig {
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, begin) = ready(Board::default());
     rig.run(begin + 500 * MS, true).unwrap();
     rig
 }
@@ -59,9 +57,7 @@ fn survives(rig: &mut Rig, since: u64, expected: &Expected<'_>) {
     let (_, messages) =
         before.and_then(|text| text.split_once("; last messages: ")).expect("the last messages");
     assert_eq!(messages.split(", ").count(), 8, "{messages}");
-    let heard: Vec<u8> = rig.machine.take_sent(1).into_iter().map(|(_, byte)| byte).collect();
-    let heard = String::from_utf8_lossy(&heard);
-    assert!(heard.contains(told), "the ground station never heard «{told}»");
+    assert_heard(rig, told);
     let compared = rig.compared();
     let missed = if cause == Cause::Watchdog { NOTICED_MS as usize * 2 } else { 0 };
     assert!(compared.wrong == 0 && compared.missing < LOST_MAX + missed, "{compared:?}");

@@ -20,7 +20,7 @@ use stm32f405_model::otg::{Action, Reply};
 use stm32f405_model::rcc::Cause;
 use stm32f405_model::time::{MS, Ps, SECOND};
 
-use super::{bench, budget};
+use super::{bench, budget, ready};
 
 /// `base_mode` of a heartbeat.
 const DISARMED: u8 = 0x51;
@@ -34,9 +34,7 @@ const LOAD_MAX: u64 = 900;
 const READ_KBPS_MIN: u64 = 900;
 
 fn on_the_ground() -> Rig {
-    let mut rig = bench().settled(Board::default()).unwrap();
-    let begin = rig.machine.now() + SECOND;
-    rig.run(begin, false).unwrap();
+    let (mut rig, _) = ready(Board::default());
     stand(&mut rig);
     rig
 }

@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use hums_tests::child::Outcome;
 use hums_tests::flights::own;
 use hums_tests::live::free_port;
-use hums_tests::program::{self, hums_with};
+use hums_tests::program::{self, hums, hums_with};
 use tempfile::TempDir;
 
 pub(crate) struct Board {
@@ -43,6 +44,11 @@ impl Board {
         Self { dir: Some(dir), child, port }
     }
 
+    /// The ground station's port.
+    pub(crate) fn address(&self) -> String {
+        format!("udpout:127.0.0.1:{}", self.port)
+    }
+
     /// Ends it as by Ctrl-C; returns the lines of its log.
     pub(crate) fn end(self) -> String {
         let dir = self.switch_off();
@@ -68,6 +74,12 @@ impl Drop for Board {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// `hums box WORDS --link ADDRESS --system 1`
+#[track_caller]
+pub(crate) fn on(address: &str, words: &str) -> Outcome {
+    hums(["box"].into_iter().chain(words.split(' ')).chain(["--link", address, "--system", "1"]))
 }
 
 /// One finished session: this part of a recording, and parameters. All such cards have logs of the same names.

@@ -19,14 +19,14 @@ const BUDGETS: [u32; 3] = [100, 1_000, 5_000];
 const BAUD: u64 = 57_600;
 const SECOND: u64 = 1_000_000;
 
-/// The first byte's time, microseconds, to a millisecond.
-struct Sent {
-    at_us: u64,
+/// The first byte's time, microseconds, to a step.
+pub(crate) struct Sent {
+    pub(crate) at_us: u64,
     bytes: Vec<u8>,
 }
 
 impl Sent {
-    fn frame(&self) -> Frame<'_> {
+    pub(crate) fn frame(&self) -> Frame<'_> {
         Frame::again(&self.bytes, Check::Verified).expect("a frame")
     }
 
@@ -35,41 +35,48 @@ impl Sent {
     }
 }
 
-/// `ask` returns the ground station's bytes for each 100 ms.
-fn chunks(recording: &Path, mut ask: impl FnMut(u64) -> Vec<u8>) -> Vec<(Side, Chunk)> {
+/// Each `step_us` time moves on; `ask` returns the ground station's bytes for each 100 ms.
+fn chunks(recording: &Path, step_us: u64, mut ask: impl FnMut(u64) -> Vec<u8>) -> Vec<(Side, Chunk)> {
     let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
     let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
     let (mut chunks, mut now_us) = (Vec::new(), 0);
     while let Some(chunk) = source.next().unwrap() {
         while now_us < chunk.at_us {
-            let (side, bytes) = if now_us % 100_000 == 0 {
-                (Side::Ground, ask(now_us))
-            } else {
-                (Side::Autopilot, Vec::new())
-            };
+            let bytes = if now_us % 100_000 == 0 { ask(now_us) } else { Vec::new() };
+            let side = if bytes.is_empty() { Side::Autopilot } else { Side::Ground };
             chunks.push((side, Chunk { at_us: now_us, bytes }));
-            now_us += 1_000;
+            now_us += step_us;
         }
         chunks.push((Side::Autopilot, chunk));
     }
     chunks
 }
 
-fn power_on(recording: &Path, budget: u32, ask: impl FnMut(u64) -> Vec<u8>) -> (Outcome, Vec<Sent>) {
+/// The output to the ground station.
+pub(crate) fn power_on(
+    recording: &Path,
+    params: &Params,
+    step_us: u64,
+    ask: impl FnMut(u64) -> Vec<u8>,
+) -> (Outcome, Vec<Sent>) {
     let dir = tempfile::tempdir().unwrap();
     let file = image::open_or_make(&dir.path().join("card.img"), Some(64), |_| Ok(())).unwrap();
     let card = SimCard::new(file, Faults::default()).unwrap();
     hums_recorder::format::format(&card, 7).unwrap();
-    let mut params = Params::defaults();
-    params.set("GS_BUDGET", budget as f32).unwrap();
-    let board = BoardSetup { card: &card, params: &params, key: None, boots: 1 };
+    let board = BoardSetup { card: &card, params, key: None, boots: 1 };
     let mut sent = Vec::new();
-    let outcome = run(&board, chunks(recording, ask), |side, at_us, bytes| {
+    let outcome = run(&board, chunks(recording, step_us, ask), |side, at_us, bytes| {
         if side == Side::Ground {
             sent.push(Sent { at_us, bytes: bytes.to_vec() });
         }
     });
     (outcome.unwrap(), sent)
+}
+
+fn with_budget(recording: &Path, budget: u32, ask: impl FnMut(u64) -> Vec<u8>) -> (Outcome, Vec<Sent>) {
+    let mut params = Params::defaults();
+    params.set("GS_BUDGET", budget as f32).unwrap();
+    power_on(recording, &params, 1_000, ask)
 }
 
 fn fullest_second(sent: &[Sent]) -> usize {
@@ -90,7 +97,7 @@ fn fullest_second(sent: &[Sent]) -> usize {
 fn no_second_holds_more_than_the_budget_and_nothing_starves() {
     for recording in ["px4_hil_quad_low.tlog", "ap_quad_signed.raw"].map(own) {
         for budget in BUDGETS {
-            let (outcome, sent) = power_on(&recording, budget, |_| Vec::new());
+            let (outcome, sent) = with_budget(&recording, budget, |_| Vec::new());
             let most = fullest_second(&sent);
             let name = recording.display();
             println!("{name}: {most} of {budget} B/s at most, {} frames", sent.len());
@@ -143,7 +150,7 @@ fn greedy(now_us: u64) -> Vec<u8> {
 fn a_critical_finding_is_out_within_fifty_milliseconds_however_busy_the_port_is() {
     let motor = root().join("tests/labelled/f01_motor_dead_hexa.tlog.gz");
     for recording in [motor, own("ap_quad_faults.tlog"), own("px4_hil_quad_low.tlog")] {
-        let (outcome, sent) = power_on(&recording, 5_000, greedy);
+        let (outcome, sent) = with_budget(&recording, 5_000, greedy);
         let most = fullest_second(&sent);
         assert!(most <= 5_000, "{}: {most} bytes in a second", recording.display());
         assert_eq!(outcome.done.stats.frames_lost, 0, "{}", recording.display());

@@ -18,7 +18,7 @@ use hums_tests::program::{hums, hums_with};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::board::{Board, assert_on_card, card, pulled_log};
+use super::board::{Board, assert_on_card, card, on, pulled_log};
 
 #[test]
 fn a_ground_station_lists_reads_sets_and_commands() {
@@ -196,27 +196,22 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     assert_eq!((&said["key"], &said["signed"]), (&"HUMS: signing key set".into(), &"34.0".into()), "{said}");
 
     // With the passphrase our own tool gets an answer.
-    let address = format!("udpout:127.0.0.1:{}", board.port);
-    let unsigned =
-        hums(["box", "params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[1]);
-    assert!(unsigned.stderr.contains("no answer"), "{}", unsigned.stderr);
     let key = folder.join("key.txt");
     fs::write(&key, "passphrase-of-this-flight\n").unwrap();
-    let key = key.to_str().unwrap();
-    let got =
-        hums(["box", "params", "get", "BAT_REM_WARN", "--key", key, "--system", "1", "--link", &address])
-            .expect_code(&[0])
-            .text();
-    assert_eq!(got, "BAT_REM_WARN 34\n");
-    let gone = hums(["box", "params", "sign", "--remove", "--key", key, "--system", "1", "--link", &address])
-        .expect_code(&[0]);
-    assert_eq!(gone.text(), "key removed\n");
-    hums(["box", "params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[0]);
-    let set =
-        hums(["box", "params", "sign", "--key", key, "--system", "1", "--link", &address]).expect_code(&[0]);
-    assert_eq!(set.text(), "key set\n");
-    hums(["box", "params", "get", "BAT_REM_WARN", "--key", key, "--system", "1", "--link", &address])
-        .expect_code(&[0]);
+    let get = "params get BAT_REM_WARN";
+    for (words, keyed, code, said) in [
+        (get, false, 1, "no answer"),
+        (get, true, 0, "BAT_REM_WARN 34\n"),
+        ("params sign --remove", true, 0, "key removed\n"),
+        (get, false, 0, "BAT_REM_WARN 34\n"),
+        ("params sign", true, 0, "key set\n"),
+        (get, true, 0, "BAT_REM_WARN 34\n"),
+    ] {
+        let words = if keyed { format!("{words} --key {}", key.display()) } else { words.to_owned() };
+        let outcome = on(&board.address(), &words).expect_code(&[code]);
+        let told = if code == 0 { outcome.text() == said } else { outcome.stderr.contains(said) };
+        assert!(told, "{words}: {outcome:?}");
+    }
 }
 
 #[test]
@@ -371,13 +366,11 @@ fn a_log_pulled_over_a_link_that_loses_a_tenth_is_the_one_on_the_card() {
     let board = Board::start_in(dir, &["--params", &params]);
     let link = Lossy::to(board.port);
     let address = format!("udpout:127.0.0.1:{}", link.port);
-    let output = pulled.to_str().unwrap();
-    let log = "00001_00.HUM";
-    hums(["box", "pull", "--link", &address, "--system", "1", "-o", output, log]).expect_code(&[0]);
+    let pull = format!("pull 00001_00.HUM -o {}", pulled.display());
+    on(&address, &pull).expect_code(&[0]);
     assert!(link.lost.load(Ordering::Relaxed) > 5, "nothing was lost: {:?}", link.lost);
     assert_on_card(&pulled_log(&pulled, "00001"), &card);
-    let again =
-        hums(["box", "pull", "--link", &address, "--system", "1", "-o", output, log]).expect_code(&[0]);
+    let again = on(&address, &pull).expect_code(&[0]);
     assert!(again.stderr.contains("00001_00.HUM: is there already as "), "{}", again.stderr);
 
     let said = oracle::log_download(board.port, &downloaded, 0.1);
@@ -395,16 +388,10 @@ fn the_command_line_lists_reads_and_sets_parameters_over_a_bad_link() {
     assert!(listed.stderr.contains("system 1: its HUMS box is heard"), "{}", listed.stderr);
     let list = listed.text();
     assert!(list.contains("GS_BUDGET 2000\n") && list.contains("BAT_REM_WARN 15\n"), "{list}");
-    let set = hums(["box", "params", "set", "BAT_REM_WARN", "21.5", "--system", "1", "--link", &address])
-        .expect_code(&[0])
-        .text();
-    assert_eq!(set, "BAT_REM_WARN 21.5\n");
-    let got = hums(["box", "params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address])
-        .expect_code(&[0])
-        .text();
-    assert_eq!(got, "BAT_REM_WARN 21.5\n");
-    let refused = hums(["box", "params", "set", "BAT_REM_WARN", "1000", "--system", "1", "--link", &address])
-        .expect_code(&[1]);
+    for words in ["params set BAT_REM_WARN 21.5", "params get BAT_REM_WARN"] {
+        assert_eq!(on(&address, words).expect_code(&[0]).text(), "BAT_REM_WARN 21.5\n");
+    }
+    let refused = on(&address, "params set BAT_REM_WARN 1000").expect_code(&[1]);
     assert!(refused.stderr.contains("keeps 21.5"), "{}", refused.stderr);
 }
 
@@ -418,19 +405,12 @@ fn a_card_from_the_shop_is_formatted_by_command_and_one_with_logs_is_not() {
     card[510..512].copy_from_slice(&[0x55, 0xAA]);
     fs::write(&image, &card).unwrap();
     let board = Board::start_in(dir, &[]);
-    let address = format!("udpout:127.0.0.1:{}", board.port);
-    let format = |flags: &[&str]| {
-        hums(
-            ["box", "format-card", "--link", &address, "--system", "1"]
-                .into_iter()
-                .chain(flags.iter().copied()),
-        )
-    };
-    assert!(format(&[]).expect_code(&[2]).stderr.contains("erases all files"));
+    let format = |flag: &str| on(&board.address(), &format!("format-card{flag}"));
+    assert!(format("").expect_code(&[2]).stderr.contains("erases all files"));
     assert_eq!(fs::read(&image).unwrap(), card, "nobody said --yes");
-    let done = format(&["--yes"]).expect_code(&[0]).text();
+    let done = format(" --yes").expect_code(&[0]).text();
     assert_eq!(done, "system 1: formatted, and recorded on\n");
-    let again = format(&["--yes"]).expect_code(&[1]);
+    let again = format(" --yes").expect_code(&[1]);
     assert!(again.stderr.contains("format such a card on a PC"), "{}", again.stderr);
     let log = board.end();
     assert!(log.contains("card is formatted by 255/190"), "the record says who did it");

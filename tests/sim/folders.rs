@@ -46,44 +46,6 @@ fn a_loop_of_links_ends_at_once_and_a_log_is_listed_once() {
     assert_eq!(names(&hums(twice).expect_code(&[0])).len(), 1);
 }
 
-#[test]
-fn pipes_and_sockets_in_a_folder_are_passed_over_and_said() {
-    let dir = tempfile::tempdir().unwrap();
-    hostile::heartbeats(dir.path(), 100);
-    assert!(Command::new("mkfifo").arg(dir.path().join("pipe.hum")).status().unwrap().success());
-    let _listener = UnixListener::bind(dir.path().join("socket.hum")).unwrap();
-    let outcome = info(dir.path()).expect_code(&[0]);
-    assert_eq!(names(&outcome), ["heartbeats"]);
-    for said in ["pipe.hum: is a pipe", "socket.hum: is a pipe, a socket or a device"] {
-        assert!(outcome.stderr.contains(said), "{said}: {}", outcome.stderr);
-    }
-}
-
-/// A device may have no end, or do something when it is opened.
-#[test]
-fn devices_in_a_folder_are_passed_over_and_said() {
-    let dir = tempfile::tempdir().unwrap();
-    hostile::heartbeats(dir.path(), 100);
-    symlink("/dev/zero", dir.path().join("link.bin")).unwrap();
-    let node = dir.path().join("device.bin");
-    let made = Command::new("mknod").arg(&node).args(["c", "1", "5"]).output();
-    let outcome = info(dir.path()).expect_code(&[0]);
-    assert_eq!(names(&outcome), ["heartbeats"]);
-    assert!(outcome.stderr.contains("link.bin: is a pipe, a socket or a device"), "{}", outcome.stderr);
-    if made.is_ok_and(|made| made.status.success()) {
-        let said = "device.bin: is a pipe, a socket or a device";
-        assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
-        return;
-    }
-    // Without permission to make one, this folder's device serves.
-    if Path::new("/dev/pts/ptmx").exists() {
-        let outcome = info(Path::new("/dev/pts")).expect_code(&[1]);
-        assert!(outcome.stderr.contains("ptmx: is a pipe, a socket or a device"), "{}", outcome.stderr);
-        return;
-    }
-    not_tested("a device in a folder (none can be made here, and /dev/pts has none)");
-}
-
 fn readers(path: &Path, out: &Path) -> Vec<Vec<OsString>> {
     let words = |words: &[&str]| words.iter().map(OsString::from).collect::<Vec<_>>();
     let (page, tables) = (out.join("page.html").into_os_string(), out.join("csv").into_os_string());
@@ -111,14 +73,34 @@ fn a_pipe_or_a_device_that_is_named_is_refused_by_each_command_with_the_way_out(
     }
 }
 
+/// A device may have no end, or do something when it is opened.
 #[test]
-fn a_pipe_beside_a_recording_is_passed_over_by_each_command_and_said() {
+fn pipes_sockets_and_devices_beside_recordings_are_passed_over_by_each_command_and_said() {
     let (dir, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    fs::copy(flights::own("ap_quad_guided.tlog"), dir.path().join("flight.tlog")).unwrap();
-    assert!(Command::new("mkfifo").arg(dir.path().join("pipe.bin")).status().unwrap().success());
+    let path = |name: &str| dir.path().join(name);
+    hostile::heartbeats(dir.path(), 100);
+    fs::copy(flights::own("ap_quad_guided.tlog"), path("flight.tlog")).unwrap();
+    assert!(Command::new("mkfifo").arg(path("pipe.bin")).status().unwrap().success());
+    let _listener = UnixListener::bind(path("socket.hum")).unwrap();
+    symlink("/dev/zero", path("link.bin")).unwrap();
+    let made = Command::new("mknod").arg(path("device.bin")).args(["c", "1", "5"]).output();
+    let is_made = made.is_ok_and(|made| made.status.success());
+    let others = ["pipe.bin", "socket.hum", "link.bin", "device.bin"];
+    let others = &others[..3 + usize::from(is_made)];
+    assert_eq!(names(&info(dir.path()).expect_code(&[0])), ["heartbeats", "flight.tlog"]);
     // `live` would keep running.
     for words in readers(dir.path(), out.path()).into_iter().filter(|words| words[0] != "live") {
         let outcome = child::run(&mut command(&words), LIMIT).expect_code(&[0, 4]);
-        assert!(outcome.stderr.contains("pipe.bin: is a pipe"), "{words:?}: {}", outcome.stderr);
+        for other in others {
+            let said = format!("{other}: is a pipe, a socket or a device");
+            assert!(outcome.stderr.contains(&said), "{words:?}, {said}: {}", outcome.stderr);
+        }
+    }
+    // Without permission to make one, this folder's device serves.
+    if !is_made && Path::new("/dev/pts/ptmx").exists() {
+        let outcome = info(Path::new("/dev/pts")).expect_code(&[1]);
+        assert!(outcome.stderr.contains("ptmx: is a pipe, a socket or a device"), "{}", outcome.stderr);
+    } else if !is_made {
+        not_tested("a device in a folder (none can be made here, and /dev/pts has none)");
     }
 }

@@ -3,7 +3,7 @@
 //! for more. Most inputs are larger than their limit.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
@@ -24,6 +24,15 @@ fn run<A: AsRef<std::ffi::OsStr>>(arguments: &[A]) -> Outcome {
 /// KiB: 16 MiB, which runs with nearly no input take (12 to 16), and `above_mib`.
 fn limit(above_mib: u64) -> u64 {
     (16 + above_mib) << 10
+}
+
+/// Inputs in a folder that is gone afterwards, each with this limit above an empty run.
+#[track_caller]
+fn assert_little<const N: usize>(above_mib: u64, inputs: impl FnOnce(&Path) -> [PathBuf; N]) {
+    let dir = tempfile::tempdir().unwrap();
+    for input in inputs(dir.path()) {
+        assert_all_bounded(&input, limit(above_mib));
+    }
 }
 
 #[track_caller]
@@ -112,20 +121,16 @@ fn assert_live_bounded(log: &Path, most: u64) {
 
 #[test]
 fn a_log_that_expands_two_thousand_fold_takes_little_memory_with_any_command() {
-    let dir = tempfile::tempdir().unwrap();
-    let most = limit(32);
-    let log = hostile::heartbeats(dir.path(), 200_000);
-    assert!(fs::metadata(&log).unwrap().len() < 100_000);
-    assert_all_bounded(&log, most);
+    assert_little(32, |dir| {
+        let log = hostile::heartbeats(dir, 200_000);
+        assert!(fs::metadata(&log).unwrap().len() < 100_000);
+        [log]
+    });
 }
 
 #[test]
 fn logs_of_one_kind_of_message_take_little_memory_with_any_command() {
-    let dir = tempfile::tempdir().unwrap();
-    let most = limit(32);
-    for log in [hostile::texts(dir.path(), 50_000), hostile::parameters(dir.path(), 30_000)] {
-        assert_all_bounded(&log, most);
-    }
+    assert_little(32, |dir| [hostile::texts(dir, 50_000), hostile::parameters(dir, 30_000)]);
 }
 
 #[test]
@@ -148,26 +153,19 @@ fn a_log_of_many_unknown_ids_takes_little_memory_and_few_files() {
 
 #[test]
 fn an_autopilots_log_of_thousands_of_tables_or_columns_takes_little_memory() {
-    let dir = tempfile::tempdir().unwrap();
-    let most = limit(64);
-    for log in [
-        hostile::wide_ulog(dir.path()),
-        hostile::long_arrays(dir.path()),
-        hostile::wide_dataflash(dir.path()),
-    ] {
-        assert_all_bounded(&log, most);
-    }
+    assert_little(64, |dir| {
+        [hostile::wide_ulog(dir), hostile::long_arrays(dir), hostile::wide_dataflash(dir)]
+    });
 }
 
 #[test]
 fn an_autopilots_log_that_is_larger_than_what_may_be_held_takes_little_memory_with_any_command() {
     const ABOVE_MIB: u64 = 40;
-    let dir = tempfile::tempdir().unwrap();
-    let most = limit(ABOVE_MIB);
-    for log in [hostile::long_dataflash(dir.path()), hostile::long_ulog(dir.path())] {
-        assert!(fs::metadata(&log).unwrap().len() > ABOVE_MIB << 20);
-        assert_all_bounded(&log, most);
-    }
+    assert_little(ABOVE_MIB, |dir| {
+        let logs = [hostile::long_dataflash(dir), hostile::long_ulog(dir)];
+        assert!(logs.iter().all(|log| fs::metadata(log).unwrap().len() > ABOVE_MIB << 20));
+        logs
+    });
 }
 
 #[test]
@@ -193,33 +191,24 @@ fn the_logs_of_a_large_folder_are_told_one_by_one() {
 #[test]
 fn eight_vehicles_with_all_that_is_drawn_take_little_memory_live() {
     let dir = tempfile::tempdir().unwrap();
-    let most = limit(64);
-    assert_live_bounded(&hostile::fleet(dir.path(), 8, 110), most);
+    assert_live_bounded(&hostile::fleet(dir.path(), 8, 110), limit(64));
 }
 
 #[test]
 fn what_is_recorded_and_packed_and_a_cards_image_take_little_memory_with_any_command() {
-    let dir = tempfile::tempdir().unwrap();
-    let most = limit(32);
-    let tlog = hostile::fleet(dir.path(), 8, 55);
-    let raw = hostile::raw_heartbeats(dir.path(), 150_000);
-    assert_all_bounded(&tlog, most);
-    assert_all_bounded(&raw, most);
-    let image = dir.path().join("card.img");
-    run(&["sim".as_ref(), tlog.as_os_str(), "--sd".as_ref(), image.as_os_str()]);
-    assert_all_bounded(&image, most);
+    assert_little(32, |dir| {
+        let (tlog, image) = (hostile::fleet(dir, 8, 55), dir.join("card.img"));
+        run(&["sim".as_ref(), tlog.as_os_str(), "--sd".as_ref(), image.as_os_str()]);
+        [tlog, hostile::raw_heartbeats(dir, 150_000), image]
+    });
 }
 
 #[test]
 fn what_a_compressed_recording_expands_to_and_a_line_without_an_end_take_little_memory() {
     const ABOVE_MIB: u64 = 10;
-    let dir = tempfile::tempdir().unwrap();
-    let most = limit(ABOVE_MIB);
-    for input in
-        [hostile::expanding(dir.path(), ABOVE_MIB + 2), hostile::long_line(dir.path(), ABOVE_MIB + 2)]
-    {
-        assert_all_bounded(&input, most);
-    }
+    assert_little(ABOVE_MIB, |dir| {
+        [hostile::expanding(dir, ABOVE_MIB + 2), hostile::long_line(dir, ABOVE_MIB + 2)]
+    });
 }
 
 #[test]
@@ -247,30 +236,25 @@ fn files_of_parameters_keys_and_images_without_an_end_are_refused_and_take_littl
 /// Longer than a test may take: `HUMS_SESSIONS=10000000` (5 GB).
 #[test]
 fn a_log_of_very_many_sessions_takes_little_memory_with_any_command() {
-    let dir = tempfile::tempdir().unwrap();
-    let most = limit(32);
     let count = std::env::var("HUMS_SESSIONS").map_or(70_000, |count| count.parse().unwrap());
-    assert_all_bounded(&hostile::starts(dir.path(), count), most);
+    assert_little(32, |dir| [hostile::starts(dir, count)]);
 }
 
 /// 16 MiB, the longest file whose lost sectors are rebuilt, which takes twice its size; and a longer one.
 #[test]
 fn a_file_of_nothing_but_parity_takes_little_memory() {
-    let dir = tempfile::tempdir().unwrap();
-    let most = limit(40);
     for blocks in [(32 << 10) - 1, 70 << 10] {
-        let log = hostile::parity(dir.path(), blocks);
-        assert_all_bounded(&log, most);
+        assert_little(40, |dir| [hostile::parity(dir, blocks)]);
     }
 }
 
 #[test]
 fn cards_full_of_entries_or_sessions_take_little_memory() {
-    let dir = tempfile::tempdir().unwrap();
     for bogus in [false, true] {
         // 260,000 entries.
-        assert_all_bounded(&hostile::directories(dir.path(), 4, bogus), limit(20));
+        assert_little(20, |dir| [hostile::directories(dir, 4, bogus)]);
     }
     // `decode` would make a file for each of these sessions.
+    let dir = tempfile::tempdir().unwrap();
     assert_bounded_but(&hostile::sessions(dir.path(), 30_000), limit(32), |line| line.starts_with("decode "));
 }

@@ -24,9 +24,3 @@ mod second_decoder;
 mod setup;
 mod texts;
 mod usage;
-
-/// In the list of ignored tests: an untested part is not a success.
-#[cfg(not(feature = "oracle"))]
-#[test]
-#[ignore = "comparisons with pymavlink: `cargo xtask test` runs them"]
-fn comparisons_with_pymavlink() {}

@@ -244,27 +244,6 @@ fn a_parameter_file_that_is_wrong_is_told_with_line_and_range_and_leaves_nothing
     }
 }
 
-#[test]
-fn a_file_that_is_no_store_or_cannot_be_read_is_refused_and_stays() {
-    let dir = tempfile::tempdir().unwrap();
-    let store = dir.path().join("store.bin");
-    let mut spoiled = vec![0x5A; 32_768];
-    fs::write(&store, &spoiled).unwrap();
-    let outcome = fly(&store, &[]).expect_code(&[1]).outcome;
-    assert!(outcome.stderr.contains("is no store, though it has the length of one"), "{}", outcome.stderr);
-    assert_eq!(fs::read(&store).unwrap(), spoiled);
-    // A spoiled store with a valid magic.
-    spoiled[..4].copy_from_slice(b"2TSH");
-    fs::write(&store, &spoiled).unwrap();
-    let outcome = fly(&store, &[]).expect_code(&[1]).outcome;
-    assert!(outcome.stderr.contains("move it away, or name a new file"), "{}", outcome.stderr);
-    assert_eq!(fs::read(&store).unwrap(), spoiled);
-    fs::write(&store, b"too short").unwrap();
-    let outcome = fly(&store, &[]).expect_code(&[1]).outcome;
-    assert!(outcome.stderr.contains("is no store"), "{}", outcome.stderr);
-    assert_eq!(fs::read(&store).unwrap(), b"too short");
-}
-
 fn records(image: &Path) -> String {
     let jsonl = ["-o", "-", "--format", "jsonl"].map(AsRef::as_ref);
     hums(["decode".as_ref(), image.as_os_str()].into_iter().chain(jsonl)).expect_code(&[0, 3]).text()

@@ -2,12 +2,12 @@
 #![cfg(feature = "oracle")]
 
 use std::fs;
-use std::net::UdpSocket;
-use std::process::{Child, Command, Stdio};
 
+use hums_tests::live::free_port;
 use hums_tests::oracle;
-use hums_tests::program::{self, hums};
 use serde_json::Value;
+
+use super::board::Board;
 
 /// The empty battery's debounce, and the tests' delay.
 const FOUND_S: f64 = 2.0;
@@ -18,36 +18,14 @@ struct Outcome {
     steps: Vec<(String, u64)>,
 }
 
-fn free_port() -> u16 {
-    UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
-}
-
-/// Ends in order, as by Ctrl-C, when dropped.
-struct Board(Child);
-
-impl Drop for Board {
-    fn drop(&mut self) {
-        let _ = Command::new("kill").args(["-INT", &self.0.id().to_string()]).status();
-        let _ = self.0.wait();
-    }
-}
-
 fn fly(params: &str, pilot: &str) -> Outcome {
-    let dir = tempfile::tempdir().unwrap();
-    let (image, file) = (dir.path().join("card.img"), dir.path().join("hums.param"));
+    let (dir, autopilot) = (tempfile::tempdir().unwrap(), free_port());
+    let file = dir.path().join("hums.param");
     fs::write(&file, params).unwrap();
-    let (autopilot, gs) = (free_port(), free_port());
-    let mut command: Command = program::command(["sim", "--json", "--speed", "real"]);
-    command.arg(format!("udpin:127.0.0.1:{autopilot}"));
-    command.arg("--gs").arg(format!("udpin:127.0.0.1:{gs}"));
-    command.arg("--sd").arg(&image).arg("--params").arg(&file);
-    let board = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let board = Board(board);
-    let said = oracle::autopilot(autopilot, gs, pilot);
-    drop(board);
-    let jsonl = ["-o", "-", "--format", "jsonl"].map(AsRef::as_ref);
-    let record =
-        hums(["decode".as_ref(), image.as_os_str()].into_iter().chain(jsonl)).expect_code(&[0]).text();
+    let input = format!("udpin:127.0.0.1:{autopilot}");
+    let board = Board::start_with(input.as_ref(), dir, &["--params", file.to_str().unwrap()]);
+    let said = oracle::autopilot(autopilot, board.port, pilot);
+    let record = board.end();
     let steps = record.lines().filter(|line| line.contains("HUMS_PROTECTION")).map(|line| {
         let entry: Value = serde_json::from_str(line).unwrap();
         let fields = &entry["fields"];

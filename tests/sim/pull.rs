@@ -11,7 +11,7 @@ use hums_tests::live::Running;
 use hums_tests::program::{command, hums};
 use tempfile::TempDir;
 
-use super::board::{Board, assert_on_card, card, pulled_log, pulled_logs};
+use super::board::{Board, assert_on_card, card, on, pulled_log, pulled_logs};
 
 const LOG: &str = "00001_00.HUM";
 const NUMBER: &str = "00001";
@@ -22,15 +22,12 @@ fn board(dir: TempDir) -> Board {
 }
 
 fn pull(board: &Board, output: &Path, names: &[&str]) -> hums_tests::child::Outcome {
-    let address = format!("udpout:127.0.0.1:{}", board.port);
-    let flags = ["box", "pull", "--link", &address, "--system", "1", "-o", output.to_str().unwrap()];
-    hums(flags.into_iter().chain(names.iter().copied()))
+    on(&board.address(), &format!("pull {} -o {}", names.join(" "), output.display()))
 }
 
 /// Killed after the first data.
 fn begin(board: &Board, output: &Path) -> PathBuf {
-    let address = format!("udpout:127.0.0.1:{}", board.port);
-    let mut pull = command(["box", "pull", "--link", &address, LOG, "-o"]);
+    let mut pull = command(["box", "pull", "--link", &board.address(), LOG, "-o"]);
     let mut child = pull.arg(output).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let words = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
     let mut pull = Running(child);

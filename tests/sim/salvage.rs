@@ -46,7 +46,7 @@ fn json(command: &str, image: &Path, flags: &[&str], code: i32) -> Value {
 
 type Wreck = fn(&Path);
 
-const WRECKS: [(&str, Wreck); 4] = [
+const WRECKS: [(&str, Wreck); 5] = [
     ("the FAT is zeros", |image| {
         let Places { fat, data, .. } = places(image);
         zero(image, fat, data);
@@ -60,13 +60,21 @@ const WRECKS: [(&str, Wreck); 4] = [
         let Places { partition, .. } = places(image);
         zero(image, partition, partition + 8 * BLOCK);
     }),
+    // Valid and empty, and may have had more data than remains.
+    ("its file system knows of no log, and sectors of logs are there", |image| {
+        let Places { fat, data, cluster_bytes, .. } = places(image);
+        zero(image, fat, data + cluster_bytes);
+        // Media, flags, root directory.
+        let head = [0x0fff_fff8_u32, 0x0fff_ffff, 0x0fff_ffff].map(u32::to_le_bytes).concat();
+        File::options().write(true).open(image).unwrap().write_all_at(&head, fat).unwrap();
+    }),
 ];
 
 #[test]
 fn a_card_without_a_file_system_gives_all_that_is_on_it() {
     let manifest = Manifest::own();
     // A flight for each.
-    for (name, (what, wreck)) in OWN.into_iter().zip(WRECKS) {
+    for (name, (what, wreck)) in OWN.into_iter().cycle().zip(WRECKS) {
         let recording = Recording::make(Machine::Sim, &own(name), &["--card-size", "64"]);
         let data = fs::read(own(name)).unwrap();
         let input = manifest.frames_of(&own(name), &data);
@@ -76,7 +84,10 @@ fn a_card_without_a_file_system_gives_all_that_is_on_it() {
         eprintln!("{name}: {what}");
         // An empty directory alone means an empty card; the FAT contradicts.
         let info = json("info", &image, &[], 3);
-        assert_ne!(info["images"][0]["damage"], serde_json::json!([]), "{what}");
+        let told = &info["images"][0]["damage"];
+        let is_told =
+            if what.starts_with("its") { told == &serde_json::json!([what]) } else { told[0].is_string() };
+        assert!(is_told, "{what}: {told}");
         assert_eq!(info["logs"].as_array().unwrap().len(), 1, "{what}: {info}");
         assert_eq!(info["logs"][0]["gaps_count"], 0, "{what}: the log itself is whole");
         for command in ["info", "info --verify", "check"] {
@@ -135,23 +146,6 @@ fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
 
 fn entry_word(image: &[u8], at: usize) -> usize {
     usize::from(u16::from_le_bytes([image[at], image[at + 1]]))
-}
-
-/// Valid and empty, and may have had more data than remains.
-#[test]
-fn a_card_that_was_formatted_gives_its_logs_and_says_so() {
-    let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
-    let image = recording.image();
-    let Places { fat, data, cluster_bytes, .. } = places(&image);
-    zero(&image, fat, data + cluster_bytes);
-    // Media, flags, root directory.
-    let head = [0x0fff_fff8_u32, 0x0fff_ffff, 0x0fff_ffff].map(u32::to_le_bytes).concat();
-    File::options().write(true).open(&image).unwrap().write_all_at(&head, fat).unwrap();
-    let info = json("info", &image, &[], 3);
-    assert_eq!(info["logs"].as_array().unwrap().len(), 1, "{info}");
-    let told = serde_json::json!(["its file system knows of no log, and sectors of logs are there"]);
-    assert_eq!(info["images"][0]["damage"], told);
-    assert_eq!(info["logs"][0]["gaps_count"], 0, "{info}");
 }
 
 #[test]

@@ -12,13 +12,12 @@ use std::time::{Duration, Instant};
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::{Fields, Packet};
 use hums_link::{Frame, Framer, ids, messages};
-use hums_tests::child::Outcome;
 use hums_tests::flights::own;
 use hums_tests::live::{Live, free_port};
 use hums_tests::program::hums;
 use serde_json::Value;
 
-use super::board::Board;
+use super::board::{Board, on};
 
 type Values = Arc<Mutex<BTreeMap<String, f32>>>;
 
@@ -89,10 +88,6 @@ fn answer(socket: &UdpSocket, framer: &mut Framer, values: &Values, waiting: &mu
     }
 }
 
-fn on(address: &str, words: &[&str]) -> Outcome {
-    hums(["box"].into_iter().chain(words.iter().copied()).chain(["--link", address, "--system", "1"]))
-}
-
 fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
 }
@@ -108,10 +103,10 @@ fn an_autopilot_is_set_for_the_box_and_the_bench_check_says_that_it_is_ready() {
     let input = format!("udpin:127.0.0.1:{port}");
     let board = Board::start_with(input.as_ref(), dir, &["--params", &file("params.txt")]);
     let autopilot = Autopilot::start(port, &before);
-    let address = format!("udpout:127.0.0.1:{}", board.port);
+    let address = board.address();
 
     let undo = file("before.param");
-    on(&address, &["setup", "--set", "--undo", &undo, "--json"]).expect_code(&[0, 4]);
+    on(&address, &format!("setup --set --undo {undo} --json")).expect_code(&[0, 4]);
     assert_eq!(fs::read_to_string(&undo).unwrap(), "SERIAL2_BAUD,57\nBRD_SER2_RTSCTS,2\n");
     let wanted = [("BRD_SER2_RTSCTS", 0.0), ("SERIAL2_BAUD", 921.0), ("SERIAL2_PROTOCOL", 2.0)];
     let owned = |values: [(&str, f32); 3]| values.map(|(name, value)| (name.to_owned(), value)).to_vec();
@@ -119,7 +114,7 @@ fn an_autopilot_is_set_for_the_box_and_the_bench_check_says_that_it_is_ready() {
     // The autopilot sends its streams a few seconds after power-on, and arms after 43 s.
     let (start, mut code) = (Instant::now(), None);
     while code != Some(0) {
-        let checked = on(&address, &["setup", "--json"]).expect_code(&[0, 4]);
+        let checked = on(&address, "setup --json").expect_code(&[0, 4]);
         let told = json(&checked.text());
         code = checked.code;
         assert_eq!(told["ready"], code == Some(0), "{told}");
@@ -133,10 +128,10 @@ fn an_autopilot_is_set_for_the_box_and_the_bench_check_says_that_it_is_ready() {
     let shown = (0..9_999).map(|_| json(&page.message())).find(|told| told["found"].is_object()).unwrap();
     assert_eq!(shown["words"], "ready to fly, but not known: clock", "of a recording: {shown}");
 
-    on(&address, &["setup", "--restore", &undo]).expect_code(&[0]);
+    on(&address, &format!("setup --restore {undo}")).expect_code(&[0]);
     assert_eq!(autopilot.values(), owned(before));
     let report = file("report.json");
-    on(&address, &["report", "-o", &report]).expect_code(&[0]);
+    on(&address, &format!("report -o {report}")).expect_code(&[0]);
     let report = json(&fs::read_to_string(&report).unwrap());
     // The parameters that are not as delivered.
     assert!(records(&report, "HUMS_BOOT") >= 1 && records(&report, "HUMS_PARAM") == 2, "{report}");
@@ -153,7 +148,7 @@ fn the_port_of_a_box_that_hears_nothing_is_set_and_restored() {
     let port = free_port();
     let autopilot = Autopilot::start(port, &before);
     let address = format!("udpin:127.0.0.1:{port}");
-    let told = json(&on(&address, &["setup", "--set", "--undo", &undo, "--json"]).expect_code(&[4]).text());
+    let told = json(&on(&address, &format!("setup --set --undo {undo} --json")).expect_code(&[4]).text());
     let checks: Vec<[&str; 2]> = told["checks"]
         .as_array()
         .unwrap()
@@ -163,7 +158,7 @@ fn the_port_of_a_box_that_hears_nothing_is_set_and_restored() {
     assert_eq!(checks, [["box", "missing"], ["settings", "ok"]], "{told}");
     let wanted = [("BRD_SER2_RTSCTS", 0.0), ("SERIAL2_BAUD", 921.0), ("SERIAL2_PROTOCOL", 2.0)];
     assert_eq!(autopilot.values(), owned(wanted));
-    on(&address, &["setup", "--restore", &undo]).expect_code(&[0]);
+    on(&address, &format!("setup --restore {undo}")).expect_code(&[0]);
     assert_eq!(autopilot.values(), owned(before));
 }
 
@@ -195,13 +190,13 @@ fn a_report_of_a_card_has_the_box_and_neither_place_nor_vehicle() {
 fn without_a_box_the_setup_still_shows_the_wiring_and_says_where_to_look() {
     let port = free_port();
     let address = format!("udpin:127.0.0.1:{port}");
-    let silent = on(&address, &["setup", "--board", "speedybee-f405-v4"]).expect_code(&[1]);
+    let silent = on(&address, "setup --board speedybee-f405-v4").expect_code(&[1]);
     let (told, error) = (silent.text(), silent.stderr.clone());
     assert!(told.contains("R1 (PA10)") && told.contains("T1 (PA9)") && told.contains("PC13"), "{told}");
     assert!(
         error.contains("check its LED") && error.contains("no HUMS box or autopilot is heard"),
         "{error}"
     );
-    let unknown = on(&address, &["setup", "--board", "no-such"]).expect_code(&[2]);
+    let unknown = on(&address, "setup --board no-such").expect_code(&[2]);
     assert!(unknown.stderr.contains("speedybee-f405-v4"), "{}", unknown.stderr);
 }

@@ -3,17 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use hums::card::{Faults, SimCard, image};
-use hums::endpoint::Endpoint;
-use hums::run::sim::both_ports::{BoardSetup, Side, run};
-use hums::source::{self, Chunk, Timing};
 use hums_core::health::{self, Level, Subsystem};
 use hums_core::parameters::Params;
 use hums_link::packet::Fields;
 use hums_link::vocabulary;
-use hums_link::{Check, Frame};
 use hums_tests::flights::{self, OWN, own, root};
 use rayon::prelude::*;
+
+use super::budget::power_on;
 
 const EVENT_S: f64 = 10.0;
 const TEXTS_MAX: usize = 3;
@@ -32,33 +29,16 @@ struct Said {
 }
 
 fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
-    let dir = tempfile::tempdir().unwrap();
-    let file = image::open_or_make(&dir.path().join("card.img"), Some(64), |_| Ok(())).unwrap();
-    let card = SimCard::new(file, Faults::default()).unwrap();
-    hums_recorder::format::format(&card, 7).unwrap();
-    let params = Params::defaults();
-    let board = BoardSetup { card: &card, params: &params, key: None, boots: 1 };
-    let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
-    let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
-    let (mut chunks, mut now_us) = (Vec::new(), 0);
-    while let Some(chunk) = source.next().unwrap() {
-        while now_us < chunk.at_us {
-            chunks.push((Side::Autopilot, Chunk { at_us: now_us, bytes: Vec::new() }));
-            now_us += LOOK_US;
-        }
-        chunks.push((Side::Autopilot, chunk));
-    }
-    let mut said = Vec::new();
-    let outcome = run(&board, chunks, |side, at_us, bytes| {
-        let frame = Frame::again(bytes, Check::Verified).filter(|frame| frame.id() == 253);
-        if let Some(frame) = frame.filter(|frame| side == Side::Ground && frame.component() == 191) {
-            let fields = Fields(frame.payload());
-            let text = fields.text(1, 50).unwrap().to_owned();
-            said.push(Said { at_s: at_us as f64 / 1e6, severity: fields.u8(0), text });
-        }
+    let (outcome, sent) = power_on(recording, &Params::defaults(), LOOK_US, |_| Vec::new());
+    let texts = sent.iter().filter(|sent| sent.frame().id() == 253 && sent.frame().component() == 191);
+    let said = texts.map(|sent| {
+        let frame = sent.frame();
+        let fields = Fields(frame.payload());
+        let text = fields.text(1, 50).unwrap().to_owned();
+        Said { at_s: sent.at_us as f64 / 1e6, severity: fields.u8(0), text }
     });
-    let critical = outcome.unwrap().findings.into_iter().filter(|finding| finding.level == Level::Critical);
-    (said, critical.map(|finding| finding.at.as_secs_f64()).collect())
+    let critical = outcome.findings.into_iter().filter(|finding| finding.level == Level::Critical);
+    (said.collect(), critical.map(|finding| finding.at.as_secs_f64()).collect())
 }
 
 /// Attitude belongs to the motors.

@@ -37,14 +37,12 @@ fn packed(dir: &Path, name: &str, raw: &[u8]) -> PathBuf {
 pub fn starts(dir: &Path, count: u32) -> PathBuf {
     let first = fs::read(heartbeats(dir, 100)).unwrap();
     let mut sector = Sector::from_bytes(*first.first_chunk::<SECTOR_BYTES>().unwrap());
-    let path = dir.join("starts.hum");
-    let mut file = BufWriter::new(File::create(&path).unwrap());
-    for session in 0..count {
-        sector.seal(1_000_000 + session);
-        file.write_all(sector.bytes()).unwrap();
-    }
-    file.flush().unwrap();
-    path
+    long(dir, "starts.hum", |file| {
+        for session in 0..count {
+            sector.seal(1_000_000 + session);
+            file.write_all(sector.bytes()).unwrap();
+        }
+    })
 }
 
 /// Ten heartbeats, then `count` parity sectors.
@@ -139,97 +137,76 @@ pub fn fleet(dir: &Path, vehicles: u8, seconds: u64) -> PathBuf {
     log_path
 }
 
+fn ulog_begin(log: &mut dyn Write) {
+    log.write_all(b"ULog\x01\x12\x35\x01").unwrap();
+    log.write_all(&1_000_000_u64.to_le_bytes()).unwrap();
+}
+
+fn ulog_message(log: &mut dyn Write, kind: u8, body: &[&[u8]]) {
+    let body = body.concat();
+    let head = u16::try_from(body.len()).unwrap().to_le_bytes();
+    log.write_all(&[&head[..], &[kind], &body].concat()).unwrap();
+}
+
 /// Two joined sets of topics, more than PX4 has: 2,000 tables of 30 columns.
 pub fn wide_ulog(dir: &Path) -> PathBuf {
     const TOPICS: u16 = 1_000;
     const FIELDS: usize = 30;
-    let mut log = Vec::new();
-    let message = |log: &mut Vec<u8>, kind: u8, body: &[u8]| {
-        log.extend_from_slice(&u16::try_from(body.len()).unwrap().to_le_bytes());
-        log.push(kind);
-        log.extend_from_slice(body);
-    };
-    for part in 0..2 {
-        log.extend_from_slice(b"ULog\x01\x12\x35\x01");
-        log.extend_from_slice(&1_000_000_u64.to_le_bytes());
-        message(&mut log, b'B', &[0; 40]);
-        let name = |topic: u16| format!("topic_{part}{topic:04}");
-        for topic in 0..TOPICS {
-            let field = |field| format!("uint8_t f_{part}{topic:04}_{field};");
-            let fields = (0..FIELDS).map(field).collect::<Vec<_>>().concat();
-            message(&mut log, b'F', format!("{}:uint64_t timestamp;{fields}", name(topic)).as_bytes());
-        }
-        for topic in 0..TOPICS {
-            message(&mut log, b'A', &[&[0][..], &topic.to_le_bytes(), name(topic).as_bytes()].concat());
-        }
-        for row in 0..20_u64 {
+    long(dir, "wide.ulg", |log| {
+        for part in 0..2 {
+            ulog_begin(log);
+            ulog_message(log, b'B', &[&[0; 40]]);
+            let name = |topic: u16| format!("topic_{part}{topic:04}");
             for topic in 0..TOPICS {
-                let at = 1_000_000 + row * 100_000 + u64::from(topic);
-                let data = [&topic.to_le_bytes()[..], &at.to_le_bytes(), &[row as u8; FIELDS]].concat();
-                message(&mut log, b'D', &data);
+                let field = |field| format!("uint8_t f_{part}{topic:04}_{field};");
+                let fields = (0..FIELDS).map(field).collect::<Vec<_>>().concat();
+                ulog_message(log, b'F', &[format!("{}:uint64_t timestamp;{fields}", name(topic)).as_bytes()]);
+            }
+            for topic in 0..TOPICS {
+                ulog_message(log, b'A', &[&[0], &topic.to_le_bytes(), name(topic).as_bytes()]);
+            }
+            for row in 0..20_u64 {
+                for topic in 0..TOPICS {
+                    let at = 1_000_000 + row * 100_000 + u64::from(topic);
+                    ulog_message(log, b'D', &[&topic.to_le_bytes(), &at.to_le_bytes(), &[row as u8; FIELDS]]);
+                }
             }
         }
-    }
-    let path = dir.join("wide.ulg");
-    fs::write(&path, log).unwrap();
-    path
+    })
 }
 
 /// Topics with an array of bytes, each a column.
 pub fn long_arrays(dir: &Path) -> PathBuf {
-    let mut log = b"ULog\x01\x12\x35\x01".to_vec();
-    log.extend_from_slice(&1_000_000_u64.to_le_bytes());
-    let message = |log: &mut Vec<u8>, kind: u8, body: &[u8]| {
-        log.extend_from_slice(&u16::try_from(body.len()).unwrap().to_le_bytes());
-        log.push(kind);
-        log.extend_from_slice(body);
-    };
-    for (topic, length) in [(0_u16, 1_000_usize), (1, 30_000)] {
-        message(
-            &mut log,
-            b'F',
-            format!("array_{topic}:uint64_t timestamp;uint8_t[{length}] data;").as_bytes(),
-        );
-        message(
-            &mut log,
-            b'A',
-            &[&[0][..], &topic.to_le_bytes(), format!("array_{topic}").as_bytes()].concat(),
-        );
-        for row in 0..200_u64 {
-            let at = 1_000_000 + row * 1_000;
-            message(
-                &mut log,
-                b'D',
-                &[&topic.to_le_bytes()[..], &at.to_le_bytes(), &vec![7; length]].concat(),
-            );
+    long(dir, "arrays.ulg", |log| {
+        ulog_begin(log);
+        for (topic, length) in [(0_u16, 1_000_usize), (1, 30_000)] {
+            let (id, name) = (topic.to_le_bytes(), format!("array_{topic}"));
+            let format = format!("{name}:uint64_t timestamp;uint8_t[{length}] data;");
+            ulog_message(log, b'F', &[format.as_bytes()]);
+            ulog_message(log, b'A', &[&[0], &id, name.as_bytes()]);
+            for row in 0..200_u64 {
+                let at = 1_000_000 + row * 1_000;
+                ulog_message(log, b'D', &[&id, &at.to_le_bytes(), &vec![7; length]]);
+            }
         }
-    }
-    let path = dir.join("arrays.ulg");
-    fs::write(&path, log).unwrap();
-    path
+    })
 }
 
 /// 45 MB and 38 s: an attitude and a long text 20 times a second.
 pub fn long_ulog(dir: &Path) -> PathBuf {
     let mut text = vec![0; 60_000];
     text[..30_000].fill(b'x');
-    let message = |log: &mut dyn Write, kind: u8, body: &[&[u8]]| {
-        let body = body.concat();
-        let head = u16::try_from(body.len()).unwrap().to_le_bytes();
-        log.write_all(&[&head[..], &[kind], &body].concat()).unwrap();
-    };
     long(dir, "long.ulg", |log| {
-        log.write_all(b"ULog\x01\x12\x35\x01").unwrap();
-        log.write_all(&1_000_000_u64.to_le_bytes()).unwrap();
-        message(log, b'F', &[b"vehicle_attitude:uint64_t timestamp;float[4] q;"]);
-        message(log, b'F', &[b"words:uint64_t timestamp;char[60000] text;"]);
-        message(log, b'A', &[&[0, 0, 0], b"vehicle_attitude"]);
-        message(log, b'A', &[&[0, 1, 0], b"words"]);
+        ulog_begin(log);
+        ulog_message(log, b'F', &[b"vehicle_attitude:uint64_t timestamp;float[4] q;"]);
+        ulog_message(log, b'F', &[b"words:uint64_t timestamp;char[60000] text;"]);
+        ulog_message(log, b'A', &[&[0, 0, 0], b"vehicle_attitude"]);
+        ulog_message(log, b'A', &[&[0, 1, 0], b"words"]);
         for row in 0..750_u64 {
             let at = (1_000_000 + row * 50_000).to_le_bytes();
             let level = [1_f32, 0.0, 0.0, row as f32 * 1e-6].map(f32::to_le_bytes).concat();
-            message(log, b'D', &[&[0, 0], &at, &level]);
-            message(log, b'D', &[&[1, 0], &at, &text]);
+            ulog_message(log, b'D', &[&[0, 0], &at, &level]);
+            ulog_message(log, b'D', &[&[1, 0], &at, &text]);
         }
     })
 }
