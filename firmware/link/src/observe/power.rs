@@ -23,14 +23,16 @@ pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
     // Function, type, charge state and mode; the rest of the message does not depend on them.
     let battery = read::<ap::BATTERY_STATUS_DATA>(payload, &[33, 34, 40, 49])?;
     let (voltage, cells) = cells(&battery.voltages, battery.voltages_ext);
+    let current = current(battery.current_battery);
     Some(Battery {
         id: battery.id,
         voltage,
         cells,
-        current: current(battery.current_battery),
+        current,
         // -1 is unknown; PX4 scales its own -1 and then sends other negative numbers.
         consumed: (battery.current_consumed >= 0).then(|| AmpereHours(battery.current_consumed as f32 / 1e3)),
-        remaining: percent(battery.battery_remaining),
+        // ArduPilot sends 0 % of a battery that it does not measure.
+        remaining: percent(battery.battery_remaining).filter(|_| voltage.is_some() || current.is_some()),
         temperature: (battery.temperature != i16::MAX)
             .then(|| Celsius(f32::from(battery.temperature) / 100.0)),
         faults: battery.fault_bitmask.bits(),
@@ -50,8 +52,7 @@ pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
 /// part beyond its range into the next. An unused place is 65535, in the extension 0.
 fn cells(base: &[u16; 10], extension: [u16; 4]) -> (Option<Volts>, [Option<CellVoltage>; CELLS_MAX]) {
     let mut cells = [None; CELLS_MAX];
-    let mut sum_mv = 0_u32;
-    let mut singly = true;
+    let (mut sum_mv, mut singly) = (0_u32, true);
     let used = base
         .iter()
         .filter(|&&mv| mv != u16::MAX)

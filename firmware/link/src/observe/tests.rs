@@ -186,9 +186,9 @@ fn battery_figures_have_their_own_scales_and_unknowns() {
         (known.current, known.remaining, known.temperature),
         (Some(Amperes(27.34)), Some(Fraction(0.86)), None)
     );
-    let unknown = ap::BATTERY_STATUS_DATA { current_consumed: -29, ..message };
+    let unknown = ap::BATTERY_STATUS_DATA { current_consumed: -29, current_battery: -1, ..message };
     let Some(Observation::Battery(unknown)) = said(&unknown) else { panic!() };
-    assert_eq!(unknown.consumed, None);
+    assert_eq!((unknown.consumed, unknown.current, unknown.remaining), (None, None, None));
 }
 
 #[test]
