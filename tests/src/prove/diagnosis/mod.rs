@@ -44,7 +44,8 @@ pub fn run(flights: &Flights, commit: impl FnOnce() -> Result<String>) -> Result
     let text = document::text(&real, &judged);
     if let Some(commit) = commit {
         let path = root().join("docs/diagnosis.md");
-        let whole = format!("{}\nCommit {commit}.\n\n{text}", document::HEAD);
+        let whole =
+            format!("{}\nCommit {commit} judged the flights of simulators.\n\n{text}", document::HEAD);
         fs::write(&path, whole).with_context(|| path.display().to_string())?;
     }
     Ok(format!("{text}\n{}", document::details(&real, &judged)))
