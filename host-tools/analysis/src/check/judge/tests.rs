@@ -37,6 +37,27 @@ fn fly(judge: &mut Judge, from_s: u64, to_s: u64, per_s: u64, remaining: f32) {
     }
 }
 
+fn finding(check: &'static str, at_ms: u64, level: Level, value: f32) -> FindingRecord<'static> {
+    FindingRecord {
+        at: Instant::from_millis(at_ms),
+        subsystem: hums_core::health::Subsystem::Recorder,
+        check,
+        instance: 0,
+        level,
+        previous: Level::Ok,
+        value,
+        limit: value / 2.0,
+        unit: "",
+    }
+}
+
+/// The judge learns of it at its end.
+fn miss(judge: &mut Judge, from_ms: u64, to_ms: u64, cause: Why) {
+    let [from, to] = [from_ms, to_ms].map(|ms| Some(Instant::from_millis(ms)));
+    let gap = Gap { from, to, cause, place: None, bytes: 0, words: String::new(), own: None };
+    judge.item(Instant::from_millis(to_ms), Item::Gap(&gap));
+}
+
 fn found(judged: &Judgement) -> Vec<(String, Level, f64)> {
     let line = |finding: &Finding| (finding.check.clone(), finding.level, finding.at.as_secs_f64());
     judged.findings.iter().map(line).collect()
@@ -220,17 +241,7 @@ fn the_worst_value_of_a_check_of_the_box_is_that_of_its_record() {
     use hums_core::health::exceedance::Crossings;
     let mut judge = Judge::new(&Limits::default(), Format::Hums);
     let at = Instant::from_millis(1_000);
-    let finding = FindingRecord {
-        at,
-        subsystem: hums_core::health::Subsystem::Recorder,
-        check: "record_lost",
-        instance: 0,
-        level: Level::Warning,
-        previous: Level::Ok,
-        value: 19.0,
-        limit: 1.0,
-        unit: "frames",
-    };
+    let finding = finding("record_lost", 1_000, Level::Warning, 19.0);
     let session = Crossings { warnings: 1, peak: 3_591.0, ..Crossings::default() };
     let exceeded = Exceedance { check: "record_lost", unit: "frames", session, ..Exceedance::default() };
     judge.item(at, Item::Record(&CHECKED));
@@ -256,10 +267,7 @@ fn a_gap_is_no_time_in_the_air_and_a_landing_right_before_it_ends_the_flight() {
         if landed {
             judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(false)));
         }
-        let (from, to) = (Some(at), Some(Instant::from_millis(930_000)));
-        let words = String::new();
-        let gap = Gap { from, to, cause: Why::NotKept, place: None, bytes: 0, words, own: None };
-        judge.item(Instant::from_millis(930_000), Item::Gap(&gap));
+        miss(&mut judge, 30_000, 930_000, Why::NotKept);
         half_seconds(&mut judge, 930_000, 950_000, true, LandedState::InAir);
         let flights = judge.end().flights;
         let air: u64 = air_ms(&flights).iter().map(|(air, _)| air).sum();
@@ -274,10 +282,7 @@ fn what_follows_a_gap_and_is_not_judged_is_time_in_the_air() {
     half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
     for from_ms in (5_000..65_000).step_by(6_000) {
         half_seconds(&mut judge, from_ms, from_ms + 4_000, true, LandedState::InAir);
-        let [from, to] = [from_ms + 4_000, from_ms + 6_000].map(Instant::from_millis);
-        let (words, cause) = (String::new(), Why::Lost);
-        let gap = Gap { from: Some(from), to: Some(to), cause, place: None, bytes: 0, words, own: None };
-        judge.item(to, Item::Gap(&gap));
+        miss(&mut judge, from_ms + 4_000, from_ms + 6_000, Why::Lost);
     }
     half_seconds(&mut judge, 65_000, 70_000, true, LandedState::InAir);
     let judged = judge.end();
@@ -566,18 +571,15 @@ fn a_pause_of_the_recording_is_no_silence_of_an_esc_and_one_that_falls_silent_is
     ] {
         let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
         escs(&mut judge, 0, 10_000);
-        let (from, to) = (Some(Instant::from_millis(9_900)), Some(Instant::from_millis(30_000)));
-        let gap = Gap { from, to, cause, place: None, bytes: 0, words: String::new(), own: None };
         if told {
-            judge.item(Instant::from_millis(30_000), Item::Gap(&gap));
+            miss(&mut judge, 9_900, 30_000, cause);
         }
         for tick in if others { 100..300 } else { 0..0 } {
             let at = Instant::from_millis(tick * 100);
             judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
         }
         escs(&mut judge, 30_000, 40_000);
-        let whole = Gap { from: Some(Instant::ZERO), to: Some(Instant::from_millis(39_900)), ..gap };
-        judge.item(Instant::from_millis(39_900), Item::Gap(&whole));
+        miss(&mut judge, 0, 39_900, cause);
         let judged = judge.end();
         let found = judged.problems.iter().filter(|problem| problem.check == "esc_silent").count();
         assert_eq!(found, silent, "{cause:?}: {:?}", judged.findings);
@@ -589,10 +591,7 @@ fn a_pause_of_the_recording_is_no_silence_of_an_esc_and_one_that_falls_silent_is
 fn findings_after_a_pause_have_the_recordings_time() {
     let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
     fly(&mut judge, 0, 10, 10, 0.9);
-    let (from, to) = (Some(Instant::from_millis(9_900)), Some(Instant::from_millis(30_000)));
-    let words = String::new();
-    let gap = Gap { from, to, cause: Why::NotKept, place: None, bytes: 0, words, own: None };
-    judge.item(Instant::from_millis(30_000), Item::Gap(&gap));
+    miss(&mut judge, 9_900, 30_000, Why::NotKept);
     fly(&mut judge, 30, 40, 10, 0.1);
     let found = found(&judge.end());
     let [(check, Level::Warning, at)] = found.as_slice() else { panic!("{found:?}") };
@@ -602,17 +601,7 @@ fn findings_after_a_pause_have_the_recordings_time() {
 
 #[test]
 fn what_the_board_found_counts_unless_other_limits_are_asked_for() {
-    let finding = FindingRecord {
-        at: Instant::from_millis(7_000),
-        subsystem: hums_core::health::Subsystem::Recorder,
-        check: "card_stall",
-        instance: 0,
-        level: Level::Critical,
-        previous: Level::Ok,
-        value: 3000.0,
-        limit: 2500.0,
-        unit: "ms",
-    };
+    let finding = finding("card_stall", 7_000, Level::Critical, 3000.0);
     let spec = Param::BatRemWarn.spec();
     for (given, by, check) in
         [(vec![], JudgedBy::Board, "card_stall"), (vec![(spec, 95.0)], JudgedBy::Here, "batt_remaining")]
@@ -676,15 +665,8 @@ fn what_the_board_found_is_named_too() {
     use hums_core::cause::Urgency;
     let mut judge = Judge::new(&Limits::default(), Format::Hums);
     let finding = FindingRecord {
-        at: Instant::from_millis(5_100),
         subsystem: hums_core::health::Subsystem::Power,
-        check: "battery_alert",
-        instance: 0,
-        level: Level::Warning,
-        previous: Level::Ok,
-        value: 1.0,
-        limit: 0.5,
-        unit: "",
+        ..finding("battery_alert", 5_100, Level::Warning, 1.0)
     };
     fly(&mut judge, 0, 5, 10, 0.9);
     let alert = Some(Alert { cause: Cause::Power, urgency: Urgency::Warning });
