@@ -378,11 +378,9 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     child::run(&mut make, LIMIT).expect_code(&[0]);
     let mut page = LivePage::start();
     let index = format!("file://{}/index.html", pages.display());
-    page.open(&index, "light", 1280, 340);
-    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    page.open_ready(&index, "light", 1280, 340);
     shoot(&mut page, "index");
-    page.open(&index, "light", 1280, 900);
-    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    page.open_ready(&index, "light", 1280, 900);
     let rows = table(&mut page, "#pages");
     assert_eq!(rows.len(), 2);
     let air = |rows: &[Vec<String>]| rows.iter().map(|row| row[7].clone()).collect::<Vec<_>>();
@@ -417,8 +415,7 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     );
 
     for width in [800, 390] {
-        page.open(&index, "light", width, 844);
-        page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+        page.open_ready(&index, "light", width, 844);
         assert_uncut(&mut page, "#pages", width);
     }
     page.run("document.querySelector('#comparisons a').click()");
@@ -426,8 +423,7 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
         "return document.title.includes('side by side') && document.documentElement.dataset.ready === 'true'",
         20,
     );
-    page.open(page_of(&pages, "compare-").as_str(), "light", 1280, 900);
-    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    page.open_ready(page_of(&pages, "compare-").as_str(), "light", 1280, 900);
     assert_compared(&mut page, &pages, &now, &before);
 }
 
@@ -600,8 +596,7 @@ return worst;
 /// Plots of a wide window too are as wide as A4 within its margins.
 #[track_caller]
 fn assert_fits_on_paper(page: &mut LivePage, address: &str) {
-    page.open(address, "light", 1920, 1000);
-    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    page.open_ready(address, "light", 1920, 1000);
     let beyond = "
         const right = document.querySelector('main').getBoundingClientRect().left + 704;
         // Plots that are folded away are not on paper.
@@ -623,8 +618,7 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     let (dir, path) = report(&recording.image(), &[0]);
     let address = format!("file://{}", path.display());
     let mut page = LivePage::start();
-    page.open(&address, "light", 1280, 900);
-    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    page.open_ready(&address, "light", 1280, 900);
     for (name, media, scheme, contrast, least) in [
         (Some("report"), "", "light", "no-preference", 4.5),
         (Some("report-dark"), "", "dark", "no-preference", 4.5),
@@ -667,8 +661,7 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     let bytes = fs::read(&pdf).unwrap();
     assert!(bytes.starts_with(b"%PDF") && bytes.len() > 50_000, "{} bytes", bytes.len());
     for width in [800, 390] {
-        page.open(&address, "light", width, 844);
-        page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+        page.open_ready(&address, "light", width, 844);
         assert_uncut(&mut page, "#flights", width);
     }
     shoot(&mut page, "report-phone");
@@ -753,8 +746,7 @@ fn a_fleet_has_a_page_of_its_vehicles_and_worst_findings() {
     child::run(command(["report"]).arg(&fleet), LIMIT).expect_code(&[1]);
     child::run(command(["report", "--compare", "--force"]).arg(&fleet), LIMIT).expect_code(&[2]);
     let mut page = LivePage::start();
-    page.open(&format!("file://{}", html.display()), "light", 1280, 900);
-    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    page.open_ready(&format!("file://{}", html.display()), "light", 1280, 900);
     let vehicles = table(&mut page, "#vehicles-table");
     let [vehicle] = vehicles.as_slice() else { panic!("{vehicles:?}") };
     assert_eq!(
@@ -767,8 +759,7 @@ fn a_fleet_has_a_page_of_its_vehicles_and_worst_findings() {
     page.run("const word = document.querySelector('#findings input'); word.value = 'nothing has this'; word.dispatchEvent(new Event('input'))");
     assert!(table(&mut page, "#findings-table").is_empty());
     assert_eq!(page.console(), serde_json::json!([]));
-    page.open(&format!("file://{}", html.display()), "light", 390, 844);
-    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    page.open_ready(&format!("file://{}", html.display()), "light", 390, 844);
     let width = page.run("return [document.documentElement.scrollWidth, innerWidth]");
     assert!(width[0].as_f64() <= width[1].as_f64(), "{width}");
 }

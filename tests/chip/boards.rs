@@ -37,7 +37,7 @@ fn fly(board: &Board) {
     let mut rig = bench.rig(parts);
     while rig.slot.counts().bytes == 0 {
         assert!(rig.machine.now() < SECOND, "{}: no clock to the card", board.name);
-        rig.run(rig.machine.now() + 20 * US, false).unwrap();
+        rig.run_for(20 * US, false).unwrap();
     }
     assert_held(&rig);
     rig.run(SECOND, false).unwrap();
@@ -81,7 +81,7 @@ fn each_board_serves_a_usb_host_and_installs_an_update() {
         println!("{}", board.name);
         let (bench, parts) = bench(board);
         let mut rig = bench.settled(parts).unwrap();
-        rig.run(rig.machine.now() + SECOND, false).unwrap();
+        rig.run_for(SECOND, false).unwrap();
         usb::serve(&mut rig);
         if let Some(button) = &board.button {
             let mut rig = bench.settled(parts).unwrap();

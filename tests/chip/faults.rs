@@ -184,9 +184,9 @@ fn a_change_of_a_ports_rate_cuts_no_byte() {
         let has_changed = |rig: &Rig| (rig.machine.chip.usarts[1].baud() / next - 1.0).abs() < 0.01;
         while !has_changed(&rig) {
             assert!(rig.machine.now() < now + 2 * SECOND, "still {baud}, not {next}");
-            rig.run(rig.machine.now() + 10 * MS, true).unwrap();
+            rig.run_for(10 * MS, true).unwrap();
         }
-        rig.run(rig.machine.now() + 200 * MS, true).unwrap();
+        rig.run_for(200 * MS, true).unwrap();
         let port = &rig.machine.chip.usarts[1];
         assert_eq!(port.counts.cut, 0, "from {baud} to {next}");
         baud = next;

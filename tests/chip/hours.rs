@@ -171,8 +171,7 @@ fn the_records_time_is_the_senders_for_an_hour_with_ten_erases() {
             rig.fill().unwrap();
             let silent = rig.machine.now() + 20 * SECOND;
             while rig.machine.chip.flash.erases.len() < round && rig.machine.now() < silent {
-                let now = rig.machine.now();
-                rig.run(now + 10 * MS, false).unwrap();
+                rig.run_for(10 * MS, false).unwrap();
             }
             assert!(rig.machine.now() < begin + round as u64 * ROUND, "round {round} has no erase");
         }

@@ -28,13 +28,6 @@ const STORAGE_NOTICED_MS: u64 = 11_100;
 /// Frames of full rate: memory, a quarter of a second, and the start.
 const LOST_MAX: usize = 700;
 
-struct Expected<'a> {
-    cause: Cause,
-    fault: &'a str,
-    told: &'a str,
-    within_ms: u64,
-}
-
 fn flying() -> Rig {
     let (mut rig, begin) = ready(Board::default());
     rig.run(begin + 500 * MS, true).unwrap();
@@ -42,16 +35,15 @@ fn flying() -> Rig {
 }
 
 #[track_caller]
-fn survives(rig: &mut Rig, since: u64, expected: &Expected<'_>) {
+fn survives(rig: &mut Rig, since: u64, expected: Cause, within_ms: u64, [fault, told]: [&str; 2]) {
     let (at, cause) = *rig.machine.resets.last().unwrap();
     let after_ms = (at - since) / MS;
-    assert!(cause == expected.cause && after_ms < expected.within_ms, "{cause:?} after {after_ms} ms");
+    assert!(cause == expected && after_ms < within_ms, "{cause:?} after {after_ms} ms");
     rig.machine.take_sent(1);
     rig.run(at + 500 * MS, true).unwrap();
     rig.run(at + 2_000 * MS, false).unwrap();
     let session = rig.sessions().pop().unwrap();
     assert!(session.frames.len() > 500, "{} frames after it", session.frames.len());
-    let Expected { fault, told, .. } = expected;
     assert!(session.texts.iter().any(|text| text == fault), "not «{fault}» but {:#?}", session.texts);
     let before = session.texts.iter().find_map(|text| text.strip_prefix("restart at "));
     let (_, messages) =
@@ -75,11 +67,7 @@ fn a_task_that_never_comes_back_is_named_by_the_next_start_however_urgent_it_is(
         let address = rig.replace(handler, &HANG, handler != STORAGE).unwrap();
         let fault = format!("fault: hangs in {task} at pc {:08x}", address + 2);
         let told = format!("HUMS: restarted after: watchdog ({task})");
-        survives(
-            &mut rig,
-            since,
-            &Expected { cause: Cause::Watchdog, fault: &fault, told: &told, within_ms },
-        );
+        survives(&mut rig, since, Cause::Watchdog, within_ms, [&fault, &told]);
     }
 }
 
@@ -90,11 +78,7 @@ fn a_fault_of_the_processor_is_survived_recorded_and_told() {
     let address = rig.replace(STORAGE, &BUS_FAULT, true).unwrap();
     let fault = format!("fault: processor fault in storage at pc {:08x}", address + 4);
     let told = "HUMS: restarted after: processor fault (storage)";
-    survives(
-        &mut rig,
-        since,
-        &Expected { cause: Cause::Software, fault: &fault, told, within_ms: NOTICED_MS },
-    );
+    survives(&mut rig, since, Cause::Software, NOTICED_MS, [&fault, told]);
 }
 
 #[test]
@@ -105,7 +89,7 @@ fn a_full_stack_hurts_nobody_and_is_survived_recorded_and_told() {
     rig.replace(MONITOR, &OVERFLOW, true).unwrap();
     let fault = "fault: stack overflow in monitor at called from 00000000";
     let told = "HUMS: restarted after: stack overflow (monitor)";
-    survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
+    survives(&mut rig, since, Cause::Software, NOTICED_MS, [fault, told]);
 }
 
 #[test]
@@ -125,7 +109,7 @@ fn a_panic_is_survived_recorded_and_told() {
     rig.replace(DOWNLINK, &[&code[..], &[0x18, 0x47]].concat(), true).unwrap();
     let fault = "fault: panic in downlink at firmware/provoked.rs:7";
     let told = "HUMS: restarted after: panic (downlink)";
-    survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
+    survives(&mut rig, since, Cause::Software, NOTICED_MS, [fault, told]);
 }
 
 fn load(register: u16, word: u32) -> Vec<u8> {

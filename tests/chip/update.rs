@@ -109,7 +109,7 @@ fn without_an_application_the_one_of_the_card_is_installed() {
     put(&rig.medium, &[(UPDATE, &new)]);
     while resets(&rig) == 0 {
         assert!(rig.machine.now() < 20 * SECOND, "it does not begin");
-        rig.run(rig.machine.now() + MS, false).unwrap();
+        rig.run_for(MS, false).unwrap();
     }
     // Nothing else ran so far.
     let (depth, limit) = (rig.machine.core.stack_depth(0), budget("memory", "resident_stack"));
@@ -134,7 +134,7 @@ fn a_card_that_was_pulled_while_it_is_programmed_goes_on_when_it_is_back() {
     for wanted in [&[0xFF; 512][..], &new[half..half + 512]] {
         while rig.machine.memory(map::APPLICATION + half as u32, 512) != wanted {
             assert!(rig.machine.now() < 30 * SECOND, "it does not begin");
-            rig.run(rig.machine.now() + MS, false).unwrap();
+            rig.run_for(MS, false).unwrap();
         }
     }
     rig.slot.event(Event::Pull);

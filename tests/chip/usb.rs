@@ -68,8 +68,7 @@ fn reading() -> (Rig, usize) {
 fn start_card_reader(rig: &mut Rig) -> usize {
     let resets = rig.machine.resets.len();
     command(rig, 5.0);
-    let now = rig.machine.now();
-    rig.run(now + 3 * SECOND, false).unwrap();
+    rig.run_for(3 * SECOND, false).unwrap();
     assert_eq!(
         rig.machine.resets[resets..].iter().map(|(_, cause)| *cause).collect::<Vec<_>>(),
         [Cause::Software]
@@ -86,7 +85,7 @@ pub(super) fn serve(rig: &mut Rig) {
     });
     rig.machine.unplug();
     // The line is still busy with the last frame.
-    rig.run(rig.machine.now() + 10 * MS, false).unwrap();
+    rig.run_for(10 * MS, false).unwrap();
     stand(rig);
     // Ends the log.
     start_card_reader(rig);
@@ -127,7 +126,7 @@ fn use_host_while<T: Send + 'static>(
     rig.machine.plug(host);
     while !thread.is_finished() {
         assert!(rig.machine.now() < end, "the host is not done");
-        rig.run(rig.machine.now() + 10 * MS, busy).unwrap();
+        rig.run_for(10 * MS, busy).unwrap();
     }
     thread.join().unwrap().unwrap_or_else(|why| panic!("at {} ms: {why:#}", rig.machine.ms()))
 }
@@ -262,15 +261,13 @@ fn a_serial_port_serves_a_station_while_the_record_at_full_rate_stays_whole() {
         asks(serial, 4_500.0)
     });
     rig.machine.unplug();
-    let now = rig.machine.now();
-    rig.run(now + 2 * SECOND, true).unwrap();
+    rig.run_for(2 * SECOND, true).unwrap();
     use_host_while(&mut rig, 60 * SECOND, true, |bus| {
         let serial = &mut Serial::attach(bus)?;
         hears_all(serial)?;
         asks(serial, 5_000.0)
     });
-    let now = rig.machine.now();
-    rig.run(now + 2 * SECOND, false).unwrap();
+    rig.run_for(2 * SECOND, false).unwrap();
     assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
     let compared = rig.compared();
     assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
@@ -299,8 +296,7 @@ fn ten_seconds_of_control_transfers_cost_no_frame() {
         }
         Ok(count)
     });
-    let now = rig.machine.now();
-    rig.run(now + 2 * SECOND, false).unwrap();
+    rig.run_for(2 * SECOND, false).unwrap();
     assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
     let (compared, session) = (rig.compared(), rig.sessions().pop().unwrap());
     assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
@@ -410,8 +406,7 @@ fn no_cable_and_no_other_command_stops_a_record() {
         Ok(())
     });
     command(&mut rig, 1.0);
-    let now = rig.machine.now();
-    rig.run(now + SECOND, false).unwrap();
+    rig.run_for(SECOND, false).unwrap();
     let armed = heartbeat_in(ARMED, 9);
     let now = rig.machine.now();
     let end = rig.machine.send(usart(&rig.wired.autopilot), &armed, now, 921_600.0);
@@ -442,7 +437,7 @@ fn whatever_a_host_does_the_next_one_gets_the_card() {
         println!("a host that {name}");
         host(&mut rig);
         rig.machine.unplug();
-        rig.run(rig.machine.now() + 500 * MS, false).unwrap();
+        rig.run_for(500 * MS, false).unwrap();
         assert_eq!(rig.machine.resets.len(), resets, "{name}: {:?}", rig.machine.resets);
         let is_same = rig.medium.content() == card && rig.medium.writes() == writes;
         assert!(is_same, "{name}: the card was written");

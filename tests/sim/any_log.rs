@@ -80,11 +80,11 @@ fn agrees(log: &Value, known: &Known, checked: &Value) {
     assert_eq!((&message["frames"], &message["id"]), (&rows.into(), &Value::Null));
 }
 
-fn info(known: &Known) {
-    let (path, checked) = (known.path(), known.checked());
+fn info(known: &Known, checked: &Value) {
+    let path = known.path();
     let text = hums_with("info --json {}", &[&path]).expect_code(&[0]).text();
     let json: Value = serde_json::from_str(&text).unwrap();
-    agrees(&json["logs"][0], known, &checked);
+    agrees(&json["logs"][0], known, checked);
 }
 
 fn data(page: &str) -> Value {
@@ -92,12 +92,12 @@ fn data(page: &str) -> Value {
     serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap()
 }
 
-fn report(known: &Known) {
-    let (path, checked, dir) = (known.path(), known.checked(), tempfile::tempdir().unwrap());
+fn report(known: &Known, checked: &Value) {
+    let (path, dir) = (known.path(), tempfile::tempdir().unwrap());
     let page = dir.path().join("page.html");
     hums_with("report {} -o {}", &[&path, &page]).expect_code(&[0]);
     let data = data(&fs::read_to_string(page).unwrap());
-    agrees(&data["log"], known, &checked);
+    agrees(&data["log"], known, checked);
     let flights = checked["flights"].as_array().unwrap();
     assert_eq!(data["flights"].as_array().unwrap().len(), flights.len());
     for (shown, flight) in data["flights"].as_array().unwrap().iter().zip(flights) {
@@ -114,7 +114,7 @@ fn report(known: &Known) {
     let found = notes.iter().filter(|note| note["kind"] == "finding");
     let found: Vec<String> =
         found.map(|note| line(&note["at_s"], &note["found"]["check"], &0.into(), &note["level"])).collect();
-    assert_eq!(found, findings(&checked));
+    assert_eq!(found, findings(checked));
     assert!(notes.iter().any(|note| note["kind"] == "text") && data["texts_count"].as_u64() > Some(5));
     assert!(flight["track"].as_array().unwrap().len() > 50, "where it flew");
     assert!(flight["parameters"].as_array().unwrap().len() > 500, "its parameters");
@@ -129,8 +129,8 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
-fn decode(known: &Known) {
-    let (path, checked, dir) = (known.path(), known.checked(), tempfile::tempdir().unwrap());
+fn decode(known: &Known, checked: &Value) {
+    let (path, dir) = (known.path(), tempfile::tempdir().unwrap());
     let out = dir.path().join("out");
     let formats = ["csv", "jsonl", "influx", "parquet"].iter().flat_map(|format| ["--format", format]);
     let mut words = vec!["decode".as_ref(), path.as_os_str(), "-o".as_ref(), out.as_os_str()];
@@ -172,7 +172,7 @@ fn decode(known: &Known) {
             )
         })
         .collect();
-    assert_eq!(found, findings(&checked));
+    assert_eq!(found, findings(checked));
 
     let all: usize = names("csv").iter().map(|name| table(name).len()).sum();
     let objects = fs::read_to_string(&of["jsonl"][0]).unwrap();
@@ -183,8 +183,8 @@ fn decode(known: &Known) {
     assert_eq!(count, found.len());
 }
 
-fn live(known: &Known) {
-    let (path, checked) = (known.path(), known.checked());
+fn live(known: &Known, checked: &Value) {
+    let path = known.path();
     let live = Live::start(&[path.to_str().unwrap()]);
     let mut page = live.page().unwrap();
     let next = |page: &mut hums_tests::live::Page, kind: &str| loop {
@@ -217,21 +217,11 @@ fn live(known: &Known) {
 }
 
 #[test]
-fn info_tells_of_an_autopilots_log_what_check_tells() {
-    [DATAFLASH, ULOG].iter().for_each(info);
-}
-
-#[test]
-fn the_page_of_an_autopilots_log_has_its_flight_its_modes_and_what_check_tells() {
-    [DATAFLASH, ULOG].iter().for_each(report);
-}
-
-#[test]
-fn the_tables_of_an_autopilots_log_have_its_rows_and_what_check_tells() {
-    [DATAFLASH, ULOG].iter().for_each(decode);
-}
-
-#[test]
-fn the_time_line_of_an_autopilots_log_has_what_check_tells() {
-    [DATAFLASH, ULOG].iter().for_each(live);
+fn info_page_tables_and_time_line_of_an_autopilots_log_have_what_check_tells() {
+    for known in [DATAFLASH, ULOG] {
+        let checked = known.checked();
+        for reader in [info, report, decode, live] {
+            reader(&known, &checked);
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -100,6 +101,14 @@ fn a_phone_is_given_an_address_and_the_token() {
     }
 }
 
+fn wait_for(image: &Path) {
+    let start = Instant::now();
+    while !image.exists() {
+        assert!(start.elapsed() < Duration::from_secs(20), "it does not begin");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
 #[test]
 fn sigterm_ends_a_recording_as_ctrl_c_does_with_the_log_closed() {
     let dir = tempfile::tempdir().unwrap();
@@ -108,11 +117,7 @@ fn sigterm_ends_a_recording_as_ctrl_c_does_with_the_log_closed() {
     let mut sim = command(["sim", "--json", &format!("udpin:127.0.0.1:{port}"), "--sd"]);
     let child = sim.arg(&image).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let mut sim = Running(child);
-    let start = Instant::now();
-    while !image.exists() {
-        assert!(start.elapsed() < Duration::from_secs(20), "it does not begin");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    wait_for(&image);
     std::thread::sleep(Duration::from_secs(1));
     sim.signal("TERM");
     assert_eq!(sim.end(Duration::from_secs(20)), Some(0));
@@ -129,11 +134,7 @@ fn a_recording_that_is_broken_off_is_not_called_whole() {
     sim.arg(own("px4_hil_quad_low.tlog")).arg("--sd").arg(&image);
     let child = sim.stdout(Stdio::null()).stderr(std::fs::File::create(&said).unwrap()).spawn().unwrap();
     let mut sim = Running(child);
-    let start = Instant::now();
-    while !image.exists() {
-        assert!(start.elapsed() < Duration::from_secs(20), "it does not begin");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    wait_for(&image);
     std::thread::sleep(Duration::from_millis(300));
     sim.signal("TERM");
     assert_eq!(sim.end(Duration::from_secs(20)), Some(3));

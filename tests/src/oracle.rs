@@ -188,6 +188,13 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "open", "url": url, "scheme": scheme, "width": width, "height": height }));
     }
 
+    /// As [`Self::open`], and waits until our script is done.
+    #[track_caller]
+    pub fn open_ready(&mut self, url: &str, scheme: &str, width: u32, height: u32) {
+        self.open(url, scheme, width, height);
+        self.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    }
+
     /// The page on a screen or on paper (`print`), with a reader's preferences.
     #[track_caller]
     pub fn media(&mut self, media: &str, features: &Value) {
@@ -322,13 +329,12 @@ pub fn usage(files: &[PathBuf]) -> Value {
 ///
 /// A byte is not part of a valid frame.
 pub fn ground_station(stream: &Path) -> Value {
-    serde_json::from_str(&ask("gs_stream.py", &[stream.to_owned()])).expect("gs_stream.py prints JSON")
+    json(&ask("gs_stream.py", &[stream.to_owned()]))
 }
 
 /// Like a ground station, by UDP: `tests/oracle/companion.py`.
 pub fn companion(port: u16) -> Value {
-    let said = ask("companion.py", &[PathBuf::from(port.to_string())]);
-    serde_json::from_str(&said).expect("companion.py prints JSON")
+    json(&ask("companion.py", &[PathBuf::from(port.to_string())]))
 }
 
 /// A text as the firmware stores it: `tests/oracle/metadata.py`.
@@ -381,5 +387,5 @@ pub fn mavproxy_alerts(stream: &Path, modules: &Path, folder: &Path) -> Value {
 /// The oldest log, with a `loss` of frames: `tests/oracle/log_download.py`.
 pub fn log_download(port: u16, out: &Path, loss: f64) -> Value {
     let arguments = [PathBuf::from(port.to_string()), out.to_owned(), PathBuf::from(loss.to_string())];
-    serde_json::from_str(&ask("log_download.py", &arguments)).expect("log_download.py prints JSON")
+    json(&ask("log_download.py", &arguments))
 }

@@ -82,6 +82,10 @@ fn ftp(rig: &mut Rig, opcode: u8, offset: u32, size: u8, data: &[u8], ms: u64) -
     rig.logs.clear();
     rig.ask(FILE_TRANSFER_PROTOCOL, &payload);
     wait(rig, ms);
+    answers(rig)
+}
+
+fn answers(rig: &Rig) -> Vec<Answer> {
     let files = rig.logs.iter().filter(|(id, _)| *id == FILE_TRANSFER_PROTOCOL);
     files
         .map(|(_, payload)| {
@@ -177,21 +181,11 @@ fn a_burst_that_is_under_way_when_its_file_makes_room_ends_with_an_error() {
     };
     let since_ms = rig.slot.now_ns() / MS;
     // The burst goes on for ten seconds and more.
-    let mut answers = ftp(&mut rig, BURST, 0, 239, &[], 2_000);
+    let mut said = ftp(&mut rig, BURST, 0, 239, &[], 2_000);
     insert(&mut rig, &medium);
-    answers.extend(rig.logs.iter().filter(|(id, _)| *id == FILE_TRANSFER_PROTOCOL).map(|(_, payload)| {
-        let payload = &payload[3..];
-        let offset = u32::from_le_bytes(payload[8..12].try_into().expect("four bytes"));
-        let data = payload[12..12 + usize::from(payload[4])].to_vec();
-        (payload[3], payload[5], payload[6] != 0, offset, data)
-    }));
-    assert_eq!(
-        answers.last().map(|answer| (answer.0, answer.1)),
-        Some((NAK, BURST)),
-        "{} answers",
-        answers.len()
-    );
-    for (_, _, _, offset, data) in answers.iter().filter(|answer| answer.0 == ACK) {
+    said.extend(answers(&rig));
+    assert_eq!(said.last().map(|answer| (answer.0, answer.1)), Some((NAK, BURST)), "{} answers", said.len());
+    for (_, _, _, offset, data) in said.iter().filter(|answer| answer.0 == ACK) {
         assert_eq!(data, &whole[*offset as usize..][..data.len()], "at {offset}");
     }
     rig.assert_told("HUMS: this log is gone: download ended", since_ms);

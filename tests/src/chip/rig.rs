@@ -94,6 +94,11 @@ impl Rig {
         Ok(())
     }
 
+    /// As [`Self::run`], from now on.
+    pub fn run_for(&mut self, time: Ps, busy: bool) -> Result<(), Box<Report>> {
+        self.run(self.machine.now() + time, busy)
+    }
+
     /// 36 s of settings on the ground, disarmed: the next calm needs an erase.
     pub fn fill(&mut self) -> Result<(), Box<Report>> {
         const NAMES: [&str; 6] = [

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result, anyhow, ensure};
 use hums::card::image::{ReadOnlyImage, open_or_make};
 use hums::card::{Faults, SimCard};
-use hums::logs::fat::{Volume, Walk};
+use hums::logs::fat::{Extent, Volume, Walk};
 use hums::run::sim::PowerOn;
 use hums::run::sim::both_ports::power_on;
 use hums_recorder::layout::Layout;
@@ -18,6 +18,13 @@ use super::stream::Stream;
 use crate::fat;
 
 pub(super) const BLOCK: usize = 512;
+
+pub(super) fn blocks_of(extents: &[Extent]) -> impl Iterator<Item = u32> + '_ {
+    extents.iter().flat_map(|extent| {
+        let first = (extent.start / BLOCK as u64) as u32;
+        first..first + extent.length.div_ceil(BLOCK as u64) as u32
+    })
+}
 
 pub(super) struct Card {
     dir: TempDir,

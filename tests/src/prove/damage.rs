@@ -7,7 +7,7 @@ use hums::logs::{Log, on_card};
 use hums_blackbox::{Header, Sector};
 use rayon::prelude::*;
 
-use super::card::{BLOCK, Card};
+use super::card::{BLOCK, Card, blocks_of};
 use super::figures::Figures;
 use super::options::Options;
 use super::pages;
@@ -118,10 +118,7 @@ impl Subject {
         ensure!(whole.gaps.is_empty() && whole.summary.blocks.damaged == 0, "damaged before any damage");
         let came_out: Vec<_> = whole.frames.iter().map(|frame| frame.hash).collect();
         ensure!(came_out == stream.hashes(), "what came out is not what went in");
-        let all = log.pieces.iter().flat_map(|piece| &piece.extents).flat_map(|extent| {
-            let first = (extent.start / BLOCK as u64) as u32;
-            first..first + (extent.length / BLOCK as u64) as u32
-        });
+        let all = log.pieces.iter().flat_map(|piece| blocks_of(&piece.extents));
         let (mut blocks, mut group) = (Vec::new(), 0);
         for block in all {
             let bytes = card.read_block(block)?;
@@ -197,15 +194,7 @@ impl Subject {
         let is_noticed =
             !damaged.gaps.is_empty() || blocks.damaged > 0 || blocks.foreign > 0 || blocks.repaired > 0;
         outcome.noticed += u64::from(is_noticed);
-        // Missing frames are known by their place.
-        let mut missing = Vec::new();
-        let mut given = damaged.frames.iter().peekable();
-        for (index, frame) in self.whole.frames.iter().enumerate() {
-            if given.next_if_eq(&frame).is_none() {
-                missing.push(index);
-            }
-        }
-        ensure!(given.peek().is_none(), "a frame came out that never went in: {:?}", given.peek());
+        let missing = self.whole.missing(&damaged.frames)?;
         outcome.harmless += u64::from(!is_noticed && missing.is_empty());
         let group = |index: &usize| self.whole.groups.partition_point(|first| first <= index);
         let groups: BTreeSet<_> = missing.iter().map(group).collect();

@@ -23,7 +23,7 @@ use tempfile::TempDir;
 
 use super::card::{BLOCK, Card};
 use super::figures::Figures;
-use super::record::{Frame, Record};
+use super::record::Record;
 use super::stream::{FULL_RATE, Stream};
 use crate::damage::Random;
 use crate::flights::own;
@@ -396,7 +396,7 @@ impl Subject {
             tally.noticed += 1;
             return Ok(());
         }
-        let missing = self.missing(&read.frames)?;
+        let missing = self.whole.missing(&read.frames)?;
         tally.lost_max = tally.lost_max.max(missing.len() as u64);
         let touched: BTreeSet<_> = damage.touched.iter().map(|sector| self.group_of[*sector]).collect();
         let group = |index: &usize| self.whole.groups.partition_point(|first| first <= index) - 1;
@@ -427,18 +427,6 @@ impl Subject {
             _ => anyhow::bail!("{verdict:?} is said: {}", overview.ending.words()),
         }
         Ok(())
-    }
-
-    /// Missing frames by index; all others are frames of the log, in order.
-    fn missing(&self, read: &[Frame]) -> Result<Vec<usize>> {
-        let (mut missing, mut given) = (Vec::new(), read.iter().peekable());
-        for (index, frame) in self.whole.frames.iter().enumerate() {
-            if given.next_if_eq(&frame).is_none() {
-                missing.push(index);
-            }
-        }
-        ensure!(given.peek().is_none(), "a frame came out that never went in: {:?}", given.peek());
-        Ok(missing)
     }
 }
 

@@ -17,7 +17,7 @@ use hums::run::sim::both_ports::power_on;
 use hums_blackbox::Cause;
 use rayon::prelude::*;
 
-use super::card::{BLOCK, Card};
+use super::card::{BLOCK, Card, blocks_of};
 use super::figures::Figures;
 use super::options::Options;
 use super::record::Record;
@@ -211,11 +211,7 @@ impl Session {
         let sealed_as = Record::of(first)?.summary.session.context("the session's log is empty")?;
         let mut owners = BTreeMap::new();
         for (index, file) in files.iter().enumerate() {
-            for extent in &file.extents {
-                let first = (extent.start / BLOCK as u64) as u32;
-                let blocks = extent.length.div_ceil(BLOCK as u64) as u32;
-                owners.extend((first..first + blocks).map(|block| (block, index)));
-            }
+            owners.extend(blocks_of(&file.extents).map(|block| (block, index)));
         }
         let device = hums::card::ReadOnlyImage::new(std::fs::File::open(card.path())?)?;
         let layout =

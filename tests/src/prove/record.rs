@@ -1,6 +1,6 @@
 //! Small enough to be compared ten thousand times.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use hums::logs::Log;
 use hums::logs::reader::{EntryCollector, GroupReceiver, LogSummary, read};
 use hums_blackbox::{Entry, Gap};
@@ -28,6 +28,18 @@ impl Record {
         let mut record = Self::default();
         record.summary = read(log, Group::default, &mut record, |_| {})?;
         Ok(record)
+    }
+
+    /// Indexes of frames that are not among those that were `read`; all of these are frames of the log, in order.
+    pub(super) fn missing(&self, read: &[Frame]) -> Result<Vec<usize>> {
+        let (mut missing, mut given) = (Vec::new(), read.iter().peekable());
+        for (index, frame) in self.frames.iter().enumerate() {
+            if given.next_if_eq(&frame).is_none() {
+                missing.push(index);
+            }
+        }
+        ensure!(given.peek().is_none(), "a frame came out that never went in: {:?}", given.peek());
+        Ok(missing)
     }
 }
 

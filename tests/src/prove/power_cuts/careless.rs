@@ -27,6 +27,7 @@ use rayon::prelude::*;
 use super::{BLOCK, FULL, GUIDED, LATER, NEW_CARD, PX4, Scenario, Session};
 use crate::damage::Random;
 use crate::flights::own;
+use crate::prove::card::blocks_of;
 use crate::prove::figures::Figures;
 use crate::prove::options::Options;
 use crate::prove::record::Record;
@@ -187,7 +188,7 @@ impl Subject {
         let mut sealed_as = BTreeMap::new();
         let mut kept = BTreeMap::new();
         for (index, file) in session.files.iter().enumerate() {
-            for block in blocks_of(file) {
+            for block in blocks_of(&file.extents) {
                 let Ok(header) = Header::read(&session.block_before(block)) else { continue };
                 if *sealed_as.entry(index).or_insert(header.session) == header.session {
                     kept.insert(block, Kept { session: header.session, file: index });
@@ -412,13 +413,6 @@ impl Subject {
         }
         Ok(false)
     }
-}
-
-fn blocks_of(file: &hums::logs::fat::CardFile) -> impl Iterator<Item = u32> + '_ {
-    file.extents.iter().flat_map(|extent| {
-        let first = (extent.start / BLOCK as u64) as u32;
-        first..first + extent.length.div_ceil(BLOCK as u64) as u32
-    })
 }
 
 fn frames_by_session(found: &FoundLogs) -> Result<BTreeMap<u32, usize>> {
