@@ -4,9 +4,11 @@
 use hums_core::clock::Instant;
 use hums_core::health::Level;
 
-use super::row::{Cell, CellType, Row};
+use super::row::{Cell, Row, count, text};
 use crate::check::judged::{JudgedBy, Judgement, TOO_LITTLE};
 use crate::check::problem::{Problem, problems};
+use crate::mavlink::values::Scalar;
+use crate::source::item::ColumnType;
 use crate::source::told::Finding;
 use crate::states;
 use crate::summary::Contents;
@@ -68,8 +70,7 @@ impl Checked {
                 (if is_judged { part.verdict() } else { TOO_LITTLE }, part.count)
             }
         };
-        let number = |count| Cell::Count(count);
-        row(self.by, verdict, findings, number(self.judged), number(self.not_judged))
+        row(self.by, verdict, findings, count(self.judged), count(self.not_judged))
     }
 }
 
@@ -105,7 +106,7 @@ impl FindingCount {
 
     /// The row of the log. The record does not name the checks that its monitor could not judge.
     pub fn row(&self) -> Row {
-        let unknown = || Cell::Unknown(CellType::Count);
+        let unknown = || Cell::Unknown(ColumnType::Unsigned);
         row(BOARD, self.verdict(), self.count, unknown(), unknown())
     }
 }
@@ -114,9 +115,9 @@ fn row(by: &str, verdict: &str, findings: u64, judged: Cell, not_judged: Cell) -
     Row::new(
         "HUMS_CHECKED",
         vec![
-            ("checked_by", Cell::Text(by.to_owned())),
-            ("verdict", Cell::Text(verdict.to_owned())),
-            ("findings", Cell::Count(findings)),
+            ("checked_by", text(by)),
+            ("verdict", text(verdict)),
+            ("findings", count(findings)),
             ("judged", judged),
             ("not_judged", not_judged),
         ],
@@ -125,19 +126,18 @@ fn row(by: &str, verdict: &str, findings: u64, judged: Cell, not_judged: Cell) -
 
 /// A finding, and who found it.
 pub fn finding_row(finding: &Finding, by: &str) -> Row {
-    let text = |text: &str| Cell::Text(text.to_owned());
     Row::new(
         "HUMS_FINDING",
         vec![
             ("at[s]", Cell::Time(finding.at)),
             ("subsystem", text(finding.subsystem.name())),
-            ("check", text(&finding.check)),
-            ("instance", Cell::Count(finding.instance.into())),
+            ("check", text(finding.check.as_str())),
+            ("instance", count(finding.instance)),
             ("level", text(finding.level.name())),
             ("previous", text(finding.previous.name())),
-            ("value", Cell::Single(finding.value)),
-            ("limit", Cell::Single(finding.limit)),
-            ("unit", text(&finding.unit)),
+            ("value", Cell::Number(Scalar::Single(finding.value))),
+            ("limit", Cell::Number(Scalar::Single(finding.limit))),
+            ("unit", text(finding.unit.as_str())),
             ("checked_by", text(by)),
         ],
     )

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
 
-use super::row::{Cell, CellType, Row};
+use super::row::{Cell, Row};
 use crate::source::item::{self, CellValue, ColumnType, Table};
 
 /// Names of tables and columns of all logs together, bytes: they are kept for as long as the program runs. No
@@ -62,26 +62,11 @@ fn kept(name: &str) -> Option<&'static str> {
 
 fn cell(kind: ColumnType, value: CellValue<'_>) -> Cell {
     match value {
-        CellValue::Unsigned(value) => Cell::Count(value),
-        CellValue::Signed(value) => Cell::Signed(value),
-        CellValue::Single(value) => Cell::Single(value),
-        CellValue::Double(value) => Cell::Double(value),
+        CellValue::Number(number) => Cell::Number(number),
         CellValue::Flag(value) => Cell::Flag(value),
         CellValue::Text(words) if kind == ColumnType::Text => Cell::Text(words.to_owned()),
-        CellValue::Text(words) => Cell::Words(words.to_owned(), cell_type(kind)),
+        CellValue::Text(words) => Cell::Words(words.to_owned(), kind),
         CellValue::Bytes(bytes) => Cell::Hex(bytes.to_owned()),
-        CellValue::Unknown => Cell::Unknown(cell_type(kind)),
-    }
-}
-
-const fn cell_type(kind: ColumnType) -> CellType {
-    match kind {
-        ColumnType::Unsigned => CellType::Count,
-        ColumnType::Signed => CellType::Signed,
-        ColumnType::Single => CellType::Single,
-        ColumnType::Double => CellType::Double,
-        ColumnType::Flag => CellType::Flag,
-        ColumnType::Text => CellType::Text,
-        ColumnType::Bytes => CellType::Hex,
+        CellValue::Unknown => Cell::Unknown(kind),
     }
 }

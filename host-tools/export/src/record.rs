@@ -2,22 +2,15 @@
 
 use hums_blackbox::Gap;
 use hums_blackbox::record::Record;
-use hums_core::clock::Instant;
 
 use super::checked::{BOARD, finding_row};
-use super::row::{Cell, CellType, Row};
+use super::row::{Cell, Row, count, known, quantity, text};
 use super::wear;
 use crate::loss;
+use crate::mavlink::values::Scalar;
 use crate::names::{clock_source_name, counter_name, event_name, fault_name};
+use crate::source::item::ColumnType;
 use crate::source::told::Finding;
-
-fn text(text: &str) -> Cell {
-    Cell::Text(text.to_owned())
-}
-
-fn count(number: impl Into<u64>) -> Cell {
-    Cell::Count(number.into())
-}
 
 /// The rows of a record: one, but for usage one a counter.
 pub fn rows(record: &Record<'_>) -> Vec<Row> {
@@ -56,7 +49,7 @@ pub fn rows(record: &Record<'_>) -> Vec<Row> {
             "HUMS_PARAM",
             vec![
                 ("name", text(parameter.name)),
-                ("value", Cell::Double(parameter.value)),
+                ("value", quantity(parameter.value)),
                 ("changed", Cell::Flag(parameter.changed)),
                 ("by_system", count(parameter.by.0)),
                 ("by_component", count(parameter.by.1)),
@@ -81,7 +74,7 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         Record::Usage(usage) => {
             let moment = format!("{:?}", usage.moment).to_ascii_lowercase();
             let row = |(number, value)| {
-                let (name, value) = (Cell::Text(counter_name(number)), Cell::Single(value));
+                let (name, value) = (Cell::Text(counter_name(number)), Cell::Number(Scalar::Single(value)));
                 Row::new("HUMS_USAGE", vec![("moment", text(&moment)), ("counter", name), ("value", value)])
             };
             usage.iter().map(row).collect()
@@ -148,18 +141,16 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
 
 /// A gap as a row.
 pub fn gap_row(gap: &Gap) -> Row {
-    let time = |at: Option<Instant>| at.map_or(Cell::Unknown(CellType::Time), Cell::Time);
-    let number = |known: Option<u32>| {
-        known.map_or(Cell::Unknown(CellType::Count), |known| Cell::Count(u64::from(known)))
-    };
+    let time = |at| known(at, Cell::Time, ColumnType::Double);
+    let number = |number: Option<u32>| known(number, count, ColumnType::Unsigned);
     Row::new(
         "HUMS_GAP",
         vec![
             ("from[s]", time(gap.from)),
             ("to[s]", time(gap.to)),
-            ("cause", Cell::Text(gap.cause.name().to_owned())),
+            ("cause", text(gap.cause.name())),
             ("sectors_lost", number(loss::sectors_lost(gap))),
-            ("sectors_skipped", Cell::Count(u64::from(gap.sectors_skipped))),
+            ("sectors_skipped", count(gap.sectors_skipped)),
             ("frames_missing", number(gap.frames)),
         ],
     )

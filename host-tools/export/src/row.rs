@@ -2,22 +2,17 @@
 
 use hums_core::clock::Instant;
 
-use super::text::{push_csv_number, push_csv_text, push_integer, push_json_number, push_json_text};
+use super::text::{push_csv_number, push_csv_text, push_json_number, push_json_text};
 use crate::hex::push_hex;
 use crate::mavlink::values::Scalar;
+use crate::source::item::ColumnType;
 use crate::utc::push_seconds;
 
 /// One value of a row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
-    /// A count or a number that names something.
-    Count(u64),
-    /// An integer that may be negative.
-    Signed(i64),
-    /// A quantity of single precision.
-    Single(f32),
-    /// A quantity of double precision.
-    Double(f64),
+    /// A number: an unsigned one counts, or names something.
+    Number(Scalar),
     /// Seconds since power-on.
     Time(Instant),
     /// Yes or no.
@@ -27,30 +22,29 @@ pub enum Cell {
     /// Bytes.
     Hex(Vec<u8>),
     /// Words in the place of a value of this type: in text and JSON only.
-    Words(String, CellType),
+    Words(String, ColumnType),
     /// Not known; it would be of this type.
-    Unknown(CellType),
+    Unknown(ColumnType),
 }
 
-/// The type of a cell and its column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CellType {
-    /// [`Cell::Count`]
-    Count,
-    /// [`Cell::Signed`]
-    Signed,
-    /// [`Cell::Single`]
-    Single,
-    /// [`Cell::Double`]
-    Double,
-    /// [`Cell::Time`]
-    Time,
-    /// [`Cell::Flag`]
-    Flag,
-    /// [`Cell::Text`]
-    Text,
-    /// [`Cell::Hex`]
-    Hex,
+/// A cell with this text.
+pub fn text(text: impl Into<String>) -> Cell {
+    Cell::Text(text.into())
+}
+
+/// A cell with this number of something.
+pub fn count(number: impl Into<u64>) -> Cell {
+    Cell::Number(Scalar::Unsigned(number.into()))
+}
+
+/// A cell with this quantity.
+pub fn quantity(number: impl Into<f64>) -> Cell {
+    Cell::Number(Scalar::Double(number.into()))
+}
+
+/// A cell that may be unknown.
+pub fn known<T>(value: Option<T>, cell: impl FnOnce(T) -> Cell, unknown: ColumnType) -> Cell {
+    value.map_or(Cell::Unknown(unknown), cell)
 }
 
 /// One row: the table and its columns, always the same ones for a table.
@@ -81,28 +75,24 @@ pub fn plain_name(name: &'static str) -> (String, &'static str) {
 }
 
 impl Cell {
-    /// Its type.
-    pub fn cell_type(&self) -> CellType {
+    /// The type of its column.
+    pub fn column_type(&self) -> ColumnType {
         match self {
-            Self::Count(_) => CellType::Count,
-            Self::Signed(_) => CellType::Signed,
-            Self::Single(_) => CellType::Single,
-            Self::Double(_) => CellType::Double,
-            Self::Time(_) => CellType::Time,
-            Self::Flag(_) => CellType::Flag,
-            Self::Text(_) => CellType::Text,
-            Self::Hex(_) => CellType::Hex,
-            Self::Words(_, cell_type) | Self::Unknown(cell_type) => *cell_type,
+            Self::Number(Scalar::Unsigned(_)) => ColumnType::Unsigned,
+            Self::Number(Scalar::Signed(_)) => ColumnType::Signed,
+            Self::Number(Scalar::Single(_)) => ColumnType::Single,
+            Self::Number(Scalar::Double(_)) | Self::Time(_) => ColumnType::Double,
+            Self::Flag(_) => ColumnType::Flag,
+            Self::Text(_) => ColumnType::Text,
+            Self::Hex(_) => ColumnType::Bytes,
+            Self::Words(_, kind) | Self::Unknown(kind) => *kind,
         }
     }
 
     /// As a CSV cell; unknown values are empty.
     pub fn push_csv(&self, out: &mut Vec<u8>) {
         match self {
-            Self::Count(value) => push_integer(out, *value),
-            Self::Signed(value) => push_csv_number(out, Scalar::Signed(*value)),
-            Self::Single(value) => push_csv_number(out, Scalar::Single(*value)),
-            Self::Double(value) => push_csv_number(out, Scalar::Double(*value)),
+            Self::Number(number) => push_csv_number(out, *number),
             Self::Time(at) => push_seconds(out, at.as_micros()),
             Self::Flag(value) => out.extend_from_slice(if *value { b"true" } else { b"false" }),
             Self::Text(text) | Self::Words(text, _) => push_csv_text(out, text.as_bytes()),
@@ -114,8 +104,7 @@ impl Cell {
     /// As a JSON value.
     pub fn push_json(&self, out: &mut Vec<u8>) {
         match self {
-            Self::Single(value) => push_json_number(out, Scalar::Single(*value)),
-            Self::Double(value) => push_json_number(out, Scalar::Double(*value)),
+            Self::Number(number) => push_json_number(out, *number),
             Self::Text(text) | Self::Words(text, _) => push_json_text(out, text.as_bytes()),
             Self::Hex(bytes) => {
                 out.push(b'"');

@@ -5,7 +5,8 @@ use hums_blackbox::record::{Component, Exceedance, Lifetime};
 
 use serde::Serialize;
 
-use super::row::{Cell, Row};
+use super::row::{Cell, Row, count, quantity, text};
+use crate::mavlink::values::Scalar;
 use crate::names::counter_name;
 use crate::summary::Contents;
 
@@ -47,13 +48,13 @@ pub(crate) fn parts_of(contents: &Contents) -> Vec<PartLine> {
 pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {
     let row = |(number, value)| {
         let cells = vec![
-            ("moment", Cell::Text(life.moment.name().to_owned())),
-            ("system", Cell::Count(u64::from(life.system))),
-            ("uid", Cell::Text(format!("{:016x}", life.uid))),
-            ("boots", Cell::Count(u64::from(life.boots))),
-            ("sessions", Cell::Count(u64::from(life.sessions))),
-            ("counter", Cell::Text(counter_name(number))),
-            ("value", Cell::Single(value)),
+            ("moment", text(life.moment.name())),
+            ("system", count(life.system)),
+            ("uid", text(format!("{:016x}", life.uid))),
+            ("boots", count(life.boots)),
+            ("sessions", count(life.sessions)),
+            ("counter", text(counter_name(number))),
+            ("value", Cell::Number(Scalar::Single(value))),
         ];
         Row::new("HUMS_LIFETIME", cells)
     };
@@ -63,16 +64,16 @@ pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {
 pub(super) fn exceedance(exceedance: &Exceedance<'_>) -> Vec<Row> {
     let row = |(of, crossings): (&str, hums_core::health::exceedance::Crossings)| {
         let cells = vec![
-            ("moment", Cell::Text(exceedance.moment.name().to_owned())),
-            ("of", Cell::Text(of.to_owned())),
-            ("check", Cell::Text(exceedance.check.to_owned())),
-            ("instance", Cell::Count(u64::from(exceedance.instance))),
-            ("warnings", Cell::Count(u64::from(crossings.warnings))),
-            ("criticals", Cell::Count(u64::from(crossings.criticals))),
-            ("warning[s]", Cell::Double(f64::from(crossings.warning_tenths) / 10.0)),
-            ("critical[s]", Cell::Double(f64::from(crossings.critical_tenths) / 10.0)),
-            ("peak", Cell::Single(crossings.peak)),
-            ("unit", Cell::Text(exceedance.unit.to_owned())),
+            ("moment", text(exceedance.moment.name())),
+            ("of", text(of)),
+            ("check", text(exceedance.check)),
+            ("instance", count(exceedance.instance)),
+            ("warnings", count(crossings.warnings)),
+            ("criticals", count(crossings.criticals)),
+            ("warning[s]", quantity(f64::from(crossings.warning_tenths) / 10.0)),
+            ("critical[s]", quantity(f64::from(crossings.critical_tenths) / 10.0)),
+            ("peak", Cell::Number(Scalar::Single(crossings.peak))),
+            ("unit", text(exceedance.unit)),
         ];
         Row::new("HUMS_EXCEEDANCE", cells)
     };
@@ -83,22 +84,22 @@ pub(super) fn component(component: &Component<'_>) -> Row {
     let figures = &component.figures;
     let by = format!("{}:{}", component.by.0, component.by.1);
     let cells = vec![
-        ("why", Cell::Text(component.why.name().to_owned())),
-        ("place", Cell::Count(u64::from(component.place) + 1)),
-        ("kind", Cell::Text(component.kind.name().to_owned())),
-        ("number", Cell::Count(u64::from(component.number))),
-        ("name", Cell::Text(component.name.to_owned())),
-        ("serial", Cell::Text(component.serial.to_owned())),
-        ("status", Cell::Text(component.status.name().to_owned())),
-        ("used[%]", Cell::Single(component.used_percent)),
-        ("powered[s]", Cell::Double(figures.powered_s)),
-        ("flight[s]", Cell::Double(figures.flight_s)),
-        ("motor[s]", Cell::Double(figures.motor_s)),
-        ("flights", Cell::Double(figures.flights)),
-        ("cycles", Cell::Double(figures.cycles)),
-        ("replaced", Cell::Count(u64::from(component.replaced))),
-        ("new_serial", Cell::Text(component.new_serial.to_owned())),
-        ("by", Cell::Text(by)),
+        ("why", text(component.why.name())),
+        ("place", count(u64::from(component.place) + 1)),
+        ("kind", text(component.kind.name())),
+        ("number", count(component.number)),
+        ("name", text(component.name)),
+        ("serial", text(component.serial)),
+        ("status", text(component.status.name())),
+        ("used[%]", Cell::Number(Scalar::Single(component.used_percent))),
+        ("powered[s]", quantity(figures.powered_s)),
+        ("flight[s]", quantity(figures.flight_s)),
+        ("motor[s]", quantity(figures.motor_s)),
+        ("flights", quantity(figures.flights)),
+        ("cycles", quantity(figures.cycles)),
+        ("replaced", count(component.replaced)),
+        ("new_serial", text(component.new_serial)),
+        ("by", text(by)),
     ];
     Row::new("HUMS_COMPONENT", cells)
 }

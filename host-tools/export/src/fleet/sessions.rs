@@ -14,8 +14,10 @@ use crate::checked::{Checked, FindingCount, problems_of};
 use crate::context::Context;
 use crate::hex::hex;
 use crate::identity::RecordingContent;
+use crate::mavlink::values::Scalar;
 use crate::names::{CounterName, counter_meaning, counter_name};
-use crate::row::{Cell, CellType, Row};
+use crate::row::{Cell, Row, count, known, quantity, text};
+use crate::source::item::ColumnType;
 use crate::source::recording::Format;
 use crate::summary::BootLine;
 use crate::wear::parts_of;
@@ -46,18 +48,6 @@ struct ProblemJson<'a> {
     unit: &'a str,
 }
 
-fn text(text: impl Into<String>) -> Cell {
-    Cell::Text(text.into())
-}
-
-fn count(number: impl Into<u64>) -> Cell {
-    Cell::Count(number.into())
-}
-
-fn known<T>(value: Option<T>, cell: impl FnOnce(T) -> Cell, unknown: CellType) -> Cell {
-    value.map_or(Cell::Unknown(unknown), cell)
-}
-
 /// The whole recording counts, also if a part is decoded.
 pub(crate) fn row(context: &Context, about: &RecordingContent) -> Row {
     let RecordingContent { overview, board, fingerprint, track, .. } = about;
@@ -66,13 +56,13 @@ pub(crate) fn row(context: &Context, about: &RecordingContent) -> Row {
     let end_utc_us = summary.last.and_then(|last| context.epochs.utc_us(last));
     let mut cells = vec![
         ("fingerprint", text(hex(fingerprint))),
-        ("file", known(overview.file_name(), Cell::Text, CellType::Text)),
+        ("file", known(overview.file_name(), text, ColumnType::Text)),
         ("format", text(overview.format.map_or("hums", Format::name))),
-        ("end_utc", known(end_utc_us, Cell::Count, CellType::Count)),
-        ("duration[s]", Cell::Double(duration_s(overview))),
-        ("latitude[deg]", known(place.map(|place| place.latitude_deg), Cell::Double, CellType::Double)),
-        ("longitude[deg]", known(place.map(|place| place.longitude_deg), Cell::Double, CellType::Double)),
-        ("box", known(board.map(|board| hex(&board)), Cell::Text, CellType::Text)),
+        ("end_utc", known(end_utc_us, count, ColumnType::Unsigned)),
+        ("duration[s]", quantity(duration_s(overview))),
+        ("latitude[deg]", known(place.map(|place| place.latitude_deg), quantity, ColumnType::Double)),
+        ("longitude[deg]", known(place.map(|place| place.longitude_deg), quantity, ColumnType::Double)),
+        ("box", known(board.map(|board| hex(&board)), text, ColumnType::Text)),
     ];
     cells.extend(machines(about));
     cells.extend(record(about));
@@ -88,7 +78,7 @@ pub(crate) fn row(context: &Context, about: &RecordingContent) -> Row {
         } else {
             counted
         };
-        (name.as_str(), known(value, Cell::Double, CellType::Double))
+        (name.as_str(), known(value, quantity, ColumnType::Double))
     };
     cells.extend(COUNTERS.iter().map(counter));
     Row::new(SESSIONS, cells)
@@ -96,12 +86,11 @@ pub(crate) fn row(context: &Context, about: &RecordingContent) -> Row {
 
 fn machines(about: &RecordingContent) -> Vec<(&'static str, Cell)> {
     let vehicle = vehicle(&about.overview);
-    let of_vehicle = |of: fn(&VehicleJson) -> Option<String>| {
-        known(vehicle.as_ref().and_then(of), Cell::Text, CellType::Text)
-    };
+    let of_vehicle =
+        |of: fn(&VehicleJson) -> Option<String>| known(vehicle.as_ref().and_then(of), text, ColumnType::Text);
     let boot = about.overview.contents.boot.as_ref();
     let of_box =
-        |of: fn(&BootLine) -> &String| known(boot.map(|boot| of(boot).clone()), Cell::Text, CellType::Text);
+        |of: fn(&BootLine) -> &String| known(boot.map(|boot| of(boot).clone()), text, ColumnType::Text);
     vec![
         ("autopilot", of_vehicle(|vehicle| Some(vehicle.autopilot.clone()))),
         ("type", of_vehicle(|vehicle| Some(vehicle.r#type.clone()))),
@@ -116,7 +105,7 @@ fn record(about: &RecordingContent) -> Vec<(&'static str, Cell)> {
     let overview = &about.overview;
     let bytes = if overview.format.is_some() { overview.bytes_on_card } else { overview.log_bytes() };
     let stats = overview.contents.stats.as_ref();
-    let number = |value: Option<u64>| known(value, Cell::Count, CellType::Count);
+    let number = |value: Option<u64>| known(value, count, ColumnType::Unsigned);
     let queue = stats
         .filter(|stats| stats.queue_bytes_capacity > 0)
         .map(|stats| 100.0 * stats.queue_bytes_max as f64 / stats.queue_bytes_capacity as f64);
@@ -125,10 +114,10 @@ fn record(about: &RecordingContent) -> Vec<(&'static str, Cell)> {
         ("gaps", count(overview.ending.summary.gaps + overview.ending.summary.losses)),
         ("frames", count(overview.contents.frames())),
         ("log_bytes", count(bytes)),
-        ("compression_ratio", known(overview.ratio(), Cell::Double, CellType::Double)),
+        ("compression_ratio", known(overview.ratio(), quantity, ColumnType::Double)),
         ("frames_in", number(stats.map(|stats| stats.frames_in))),
         ("frames_lost", number(stats.map(|stats| stats.frames_lost))),
-        ("queue[%]", known(queue, Cell::Double, CellType::Double)),
+        ("queue[%]", known(queue, quantity, ColumnType::Double)),
         ("longest_stall[ms]", number(stats.map(|stats| stats.sd_stall_ms_max))),
     ]
 }
@@ -165,14 +154,15 @@ fn health(context: &Context, about: &RecordingContent) -> Vec<(&'static str, Cel
     let due = parts.iter().filter(|part| part.used_percent.is_some());
     let due = due
         .max_by(|one, other| one.used_percent.unwrap_or(0.0).total_cmp(&other.used_percent.unwrap_or(0.0)));
+    let used_percent = due.and_then(|part| part.used_percent).map(Scalar::Single);
     cells.extend([
         ("criticals", count(of_level(Level::Critical))),
         ("warnings", count(of_level(Level::Warning))),
-        ("worst_check", known(worst.map(|worst| worst.check.clone()), Cell::Text, CellType::Text)),
-        ("worst_level", known(worst.map(|worst| worst.level.name().to_owned()), Cell::Text, CellType::Text)),
+        ("worst_check", known(worst.map(|worst| worst.check.clone()), text, ColumnType::Text)),
+        ("worst_level", known(worst.map(|worst| worst.level.name().to_owned()), text, ColumnType::Text)),
         ("problems", text(serde_json::to_string(&json).unwrap_or_default())),
-        ("most_used_part", known(due.map(|part| part.name.clone()), Cell::Text, CellType::Text)),
-        ("most_used[%]", known(due.and_then(|part| part.used_percent), Cell::Single, CellType::Single)),
+        ("most_used_part", known(due.map(|part| part.name.clone()), text, ColumnType::Text)),
+        ("most_used[%]", known(used_percent, Cell::Number, ColumnType::Single)),
         ("parts", text(serde_json::to_string(&parts).unwrap_or_default())),
     ]);
     cells
@@ -193,6 +183,6 @@ mod tests {
         let row = row(&Context::default(), &about);
         let cell = |name| row.cells.iter().find(|(of, _)| *of == name).map(|(_, cell)| cell.clone());
         let cells = ["flight_time_s", "flights", "charge_ah"].map(cell);
-        assert_eq!(cells, [300.0, 1.0, 2.0].map(|value| Some(Cell::Double(value))));
+        assert_eq!(cells, [300.0, 1.0, 2.0].map(|value| Some(quantity(value))));
     }
 }

@@ -71,11 +71,6 @@ impl Lines {
         self.ends.is_empty()
     }
 
-    /// Bytes of memory that it holds.
-    pub fn held_bytes(&self) -> usize {
-        self.text.len() + size_of::<(usize, Instant)>() * self.ends.len()
-    }
-
     /// Number of lines.
     pub fn len(&self) -> usize {
         self.ends.len()
@@ -279,11 +274,12 @@ impl<'a> Fields<'a> {
 
     fn cell(&mut self, name: &str, cell: &Cell) {
         match cell {
-            Cell::Count(value) if name == "value" => self.float(name, Scalar::Double(*value as f64)),
-            Cell::Count(value) => self.name(name).integer(i64::try_from(*value).unwrap_or(i64::MAX)),
-            Cell::Signed(value) => self.name(name).integer(*value),
-            Cell::Single(value) => self.float(name, Scalar::Single(*value)),
-            Cell::Double(value) => self.float(name, Scalar::Double(*value)),
+            Cell::Number(value) if name == "value" => self.float(name, *value),
+            Cell::Number(Scalar::Unsigned(value)) => {
+                self.name(name).integer(i64::try_from(*value).unwrap_or(i64::MAX));
+            }
+            Cell::Number(Scalar::Signed(value)) => self.name(name).integer(*value),
+            Cell::Number(value) => self.float(name, *value),
             Cell::Time(at) => self.float(name, Scalar::Double(at.as_secs_f64())),
             Cell::Flag(value) => {
                 self.name(name).text.extend_from_slice(if *value { b"true" } else { b"false" });
@@ -351,20 +347,17 @@ pub(super) struct Influx {
     count: u64,
 }
 
-#[derive(Default)]
-pub(super) struct Points(Lines);
-
-impl GroupEncoder for Points {
+impl GroupEncoder for Lines {
     fn frame(&mut self, context: &Context, entry: &Entry<'_>) {
-        self.0.frame(&context.tags, entry.at, entry.frame, entry.known);
+        self.frame(&context.tags, entry.at, entry.frame, entry.known);
     }
 
     fn row(&mut self, context: &Context, at: Instant, row: &Row) {
-        self.0.row(&context.tags, at, row);
+        self.row(&context.tags, at, row);
     }
 
     fn held_bytes(&self) -> usize {
-        self.0.held_bytes()
+        self.text.len() + size_of::<(usize, Instant)>() * self.ends.len()
     }
 }
 
@@ -374,7 +367,7 @@ impl Writer for Influx {
         needs_identity: true,
         ..FormatDetails::new("influx", "Lines for InfluxDB, VictoriaMetrics and QuestDB", Files::One("lp"))
     };
-    type Encoder = Points;
+    type Encoder = Lines;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         Ok(Self {
@@ -387,9 +380,9 @@ impl Writer for Influx {
         })
     }
 
-    fn part(&mut self, context: &Context, part: Points, story: &Story) -> Result<()> {
+    fn part(&mut self, context: &Context, part: Lines, story: &Story) -> Result<()> {
         self.text.clear();
-        self.messages.write(&part.0, &context.epochs, &mut self.text);
+        self.messages.write(&part, &context.epochs, &mut self.text);
         let mut lines = Lines::default();
         for observed in &story.observed {
             let own = self.reference.observe(observed.at, observed.source, &observed.observation);

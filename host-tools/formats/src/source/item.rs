@@ -191,13 +191,13 @@ impl Columns {
 /// The type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColumnType {
-    /// [`CellValue::Unsigned`]
+    /// [`Scalar::Unsigned`]
     Unsigned,
-    /// [`CellValue::Signed`]
+    /// [`Scalar::Signed`]
     Signed,
-    /// [`CellValue::Single`]
+    /// [`Scalar::Single`]
     Single,
-    /// [`CellValue::Double`]
+    /// [`Scalar::Double`]
     Double,
     /// [`CellValue::Flag`]
     Flag,
@@ -233,14 +233,8 @@ pub struct Row<'a> {
 pub enum CellValue<'a> {
     /// Not there.
     Unknown,
-    /// An unsigned integer.
-    Unsigned(u64),
-    /// An integer.
-    Signed(i64),
-    /// A number of single precision.
-    Single(f32),
-    /// A number of double precision.
-    Double(f64),
+    /// A number.
+    Number(Scalar),
     /// Yes or no.
     Flag(bool),
     /// Words.
@@ -249,25 +243,11 @@ pub enum CellValue<'a> {
     Bytes(&'a [u8]),
 }
 
-impl From<Scalar> for CellValue<'_> {
-    fn from(number: Scalar) -> Self {
-        match number {
-            Scalar::Unsigned(value) => Self::Unsigned(value),
-            Scalar::Signed(value) => Self::Signed(value),
-            Scalar::Single(value) => Self::Single(value),
-            Scalar::Double(value) => Self::Double(value),
-        }
-    }
-}
-
 impl CellValue<'_> {
     /// As a number, if it is one.
     pub fn number(self) -> Option<f64> {
         Some(match self {
-            Self::Unsigned(value) => value as f64,
-            Self::Signed(value) => value as f64,
-            Self::Single(value) => f64::from(value),
-            Self::Double(value) => value,
+            Self::Number(number) => number.as_f64(),
             Self::Flag(value) => f64::from(u8::from(value)),
             Self::Unknown | Self::Text(_) | Self::Bytes(_) => return None,
         })

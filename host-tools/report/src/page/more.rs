@@ -229,7 +229,7 @@ fn default_of(row: &Row<'_>) -> Option<ParameterDefault> {
         _ => return None,
     };
     let Some(CellValue::Text(name)) = value_of(row, name) else { return None };
-    let value = value_of(row, value).and_then(double).filter(|value| value.is_finite())?;
+    let value = value_of(row, value).and_then(|value| value.number()).filter(|value| value.is_finite())?;
     Some(ParameterDefault { name: (*name).to_owned(), value, is_of_airframe })
 }
 
@@ -238,18 +238,11 @@ fn value_of<'a, 'b>(row: &'a Row<'b>, name: &str) -> Option<&'a CellValue<'b>> {
     row.values.get(place)
 }
 
-fn double(value: &CellValue<'_>) -> Option<f64> {
-    match *value {
-        CellValue::Unsigned(number) => Some(number as f64),
-        CellValue::Signed(number) => Some(number as f64),
-        CellValue::Single(number) => Some(f64::from(number)),
-        CellValue::Double(number) => Some(number),
-        CellValue::Unknown | CellValue::Flag(_) | CellValue::Text(_) | CellValue::Bytes(_) => None,
-    }
-}
-
 pub(super) fn number(row: &Row<'_>, name: &str) -> Option<f32> {
-    value_of(row, name).and_then(double).map(|number| number as f32).filter(|number| number.is_finite())
+    value_of(row, name)
+        .and_then(|value| value.number())
+        .map(|number| number as f32)
+        .filter(|number| number.is_finite())
 }
 
 fn flag(row: &Row<'_>, name: &str) -> bool {
@@ -268,6 +261,7 @@ mod tests {
     use hums_link::packet::Packet;
 
     use super::*;
+    use crate::mavlink::values::Scalar;
     use crate::source::item::{Column, ColumnType, Table};
 
     fn told(tell: impl FnOnce(&mut ValueSink<'_>)) -> Vec<(Line, f32)> {
@@ -296,6 +290,14 @@ mod tests {
         take(&Row { table: &Arc::new(table), values })
     }
 
+    const fn count(number: u64) -> CellValue<'static> {
+        CellValue::Number(Scalar::Unsigned(number))
+    }
+
+    const fn single(number: f32) -> CellValue<'static> {
+        CellValue::Number(Scalar::Single(number))
+    }
+
     #[test]
     fn wind_comes_from_where_it_does_not_blow_to() {
         let east = Packet::new(WIND_COV).f32(8, 0.0).f32(12, 5.0);
@@ -303,9 +305,9 @@ mod tests {
         assert_eq!(message(&east), from_west);
         assert_eq!(message(&Packet::new(WIND).f32(0, -90.0).f32(4, 5.0)), from_west);
         let columns = ["C", "VWN", "VWE"];
-        let values = [CellValue::Unsigned(0), CellValue::Single(0.0), CellValue::Single(5.0)];
+        let values = [count(0), single(0.0), single(5.0)];
         assert_eq!(row("XKF2", &columns, &values), from_west);
-        let second = [CellValue::Unsigned(1), CellValue::Single(0.0), CellValue::Single(5.0)];
+        let second = [count(1), single(0.0), single(5.0)];
         assert_eq!(row("XKF2", &columns, &second), [], "another core is another estimate");
         let topic = ["multi_id", "windspeed_north", "windspeed_east"];
         assert_eq!(row("wind", &topic, &values), from_west);
@@ -330,21 +332,16 @@ mod tests {
     fn channels_that_are_not_used_have_no_line() {
         let sticks = Packet::new(RC_CHANNELS).u16(4, 1500).u16(6, 0).u16(8, u16::MAX).u16(10, 1900).u8(40, 4);
         assert_eq!(message(&sticks), [((Plot::Sticks, 0), 1500.0), ((Plot::Sticks, 3), 1900.0)]);
-        let values = [CellValue::Unsigned(1500), CellValue::Unsigned(0)];
+        let values = [count(1500), count(0)];
         assert_eq!(row("RCIN", &["C1", "C2"], &values), [((Plot::Sticks, 0), 1500.0)]);
-        let values = [
-            CellValue::Unsigned(0),
-            CellValue::Unsigned(1),
-            CellValue::Unsigned(1100),
-            CellValue::Unsigned(1200),
-        ];
+        let values = [count(0), count(1), count(1100), count(1200)];
         let columns = ["multi_id", "channel_count", "values[0]", "values[1]"];
         assert_eq!(row("input_rc", &columns, &values), [((Plot::Sticks, 0), 1100.0)]);
     }
 
     #[test]
     fn a_default_is_the_one_that_the_log_tells() {
-        let of = |value| [CellValue::Text("RTL_ALT"), CellValue::Single(15.0), CellValue::Single(value)];
+        let of = |value| [CellValue::Text("RTL_ALT"), single(15.0), single(value)];
         let parm = |value| with_row("PARM", &["Name", "Value", "Default"], &of(value), default_of);
         assert_eq!(parm(f32::NAN), None, "before 4.3, and where it is not known");
         assert_eq!(
@@ -353,7 +350,7 @@ mod tests {
         );
         let values = [
             CellValue::Text("MC_ROLL_P"),
-            CellValue::Double(6.5),
+            CellValue::Number(Scalar::Double(6.5)),
             CellValue::Flag(false),
             CellValue::Flag(true),
         ];

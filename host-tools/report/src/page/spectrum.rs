@@ -213,6 +213,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::mavlink::values::Scalar;
     use crate::source::item::{CellValue, Column, ColumnType, Table};
 
     #[test]
@@ -229,7 +230,8 @@ mod tests {
         let rows = table("ISBD", &own(&["seqno"]).into_iter().chain(arrays).collect::<Vec<_>>());
         let slow = table("IMU", &own(&["I", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ"]));
         let mut spectra = Spectra::default();
-        let numbers = |of: &[f64]| of.iter().map(|value| CellValue::Double(*value)).collect::<Vec<_>>();
+        let numbers =
+            |of: &[f64]| of.iter().map(|value| CellValue::Number(Scalar::Double(*value))).collect::<Vec<_>>();
         for batch in 0..4_u32 {
             let at = Instant::from_millis(u64::from(batch) * 2_000);
             let values = numbers(&[f64::from(batch), 1.0, 0.0, 100.0, 1_024.0, 2_000.0]);

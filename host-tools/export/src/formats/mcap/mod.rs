@@ -148,10 +148,7 @@ fn list(out: &mut Vec<u8>, values: Array<'_>) {
 /// A value that is not known, or is a word in place of a number, is left out.
 fn cell(out: &mut Vec<u8>, number: u32, value: &Cell) {
     match value {
-        Cell::Count(value) => unsigned(out, number, *value),
-        Cell::Signed(value) => signed(out, number, *value),
-        Cell::Single(value) => float(out, number, *value),
-        Cell::Double(value) => double(out, number, *value),
+        Cell::Number(value) => scalar(out, number, *value),
         Cell::Time(at) => double(out, number, at.as_secs_f64()),
         Cell::Flag(value) => unsigned(out, number, u64::from(*value)),
         Cell::Text(text) => bytes(out, number, text.as_bytes()),

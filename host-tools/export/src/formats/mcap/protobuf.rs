@@ -1,40 +1,20 @@
 //! Messages and their descriptors in Protocol Buffers, by the
 //! [encoding](https://protobuf.dev/programming-guides/encoding/) and `descriptor.proto`.
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Type {
-    Double,
-    Float,
-    Int64,
-    Uint64,
-    Sint64,
-    Int32,
-    Bool,
-    String,
-    Bytes,
-    /// By its full name.
-    Message(&'static str),
-    /// By its full name.
-    Enum(&'static str),
-}
+/// Of `FieldDescriptorProto`, and the full name of a message or an enumeration.
+pub(super) type Type = (u64, &'static str);
 
-impl Type {
-    const fn number(self) -> u64 {
-        match self {
-            Self::Double => 1,
-            Self::Float => 2,
-            Self::Int64 => 3,
-            Self::Uint64 => 4,
-            Self::Int32 => 5,
-            Self::Bool => 8,
-            Self::String => 9,
-            Self::Message(_) => 11,
-            Self::Bytes => 12,
-            Self::Enum(_) => 14,
-            Self::Sint64 => 18,
-        }
-    }
-}
+pub(super) const DOUBLE: Type = (1, "");
+pub(super) const FLOAT: Type = (2, "");
+pub(super) const INT64: Type = (3, "");
+pub(super) const UINT64: Type = (4, "");
+pub(super) const INT32: Type = (5, "");
+pub(super) const BOOL: Type = (8, "");
+pub(super) const STRING: Type = (9, "");
+pub(super) const MESSAGE: u64 = 11;
+pub(super) const BYTES: Type = (12, "");
+pub(super) const ENUM: u64 = 14;
+pub(super) const SINT64: Type = (18, "");
 
 #[derive(Clone, Debug)]
 pub(super) struct Field {
@@ -150,8 +130,9 @@ fn define(out: &mut Vec<u8>, field: &Field) {
     bytes(out, 1, field.name.as_bytes());
     unsigned(out, 3, u64::from(field.number));
     unsigned(out, 4, if field.is_list { REPEATED } else { OPTIONAL });
-    unsigned(out, 5, field.kind.number());
-    if let Type::Message(name) | Type::Enum(name) = field.kind {
+    let (kind, name) = field.kind;
+    unsigned(out, 5, kind);
+    if !name.is_empty() {
         bytes(out, 6, name.as_bytes());
     }
     if field.is_list {

@@ -5,9 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use hums_dialect::Kind;
 
 use super::Topic;
-use super::protobuf::{Enumeration, Field, Type, file};
-use crate::row::{CellType, Row, plain_name};
-use crate::source::item::Table;
+use super::protobuf::{
+    BOOL, BYTES, DOUBLE, ENUM, Enumeration, FLOAT, Field, INT32, INT64, MESSAGE, SINT64, STRING, Type,
+    UINT64, file,
+};
+use crate::row::{Row, plain_name};
+use crate::source::item::{ColumnType, Table};
 
 pub(super) struct Schema {
     pub(super) name: String,
@@ -19,7 +22,7 @@ pub(super) struct Schema {
 }
 
 const TIME_FILE: &str = "google/protobuf/timestamp.proto";
-const TIMESTAMP: Type = Type::Message(".google.protobuf.Timestamp");
+const TIMESTAMP: Type = (MESSAGE, ".google.protobuf.Timestamp");
 
 type Definition<'a> = (&'a str, Vec<Field>, Option<Enumeration>);
 
@@ -36,8 +39,8 @@ pub(super) fn schema(topic: Topic, rows: &BTreeMap<&'static str, Row>) -> Option
             plain("mavlink", message.name, path, fields)
         }
         Topic::Opaque => {
-            let numbers = ["system", "component", "id", "sequence"].map(|name| (name, Type::Uint64));
-            let fields = numbers.into_iter().chain([("payload", Type::Bytes)]);
+            let numbers = ["system", "component", "id", "sequence"].map(|name| (name, UINT64));
+            let fields = numbers.into_iter().chain([("payload", BYTES)]);
             let fields = fields.map(|(name, kind)| (name.to_owned(), kind, false, ""));
             plain("mavlink", "Opaque", "/opaque".to_owned(), fields)
         }
@@ -47,7 +50,7 @@ pub(super) fn schema(topic: Topic, rows: &BTreeMap<&'static str, Row>) -> Option
             let fields = rows.get(table)?.cells.iter().map(|(column, cell)| {
                 let (name, unit) = plain_name(column);
                 let name = Table::free_name(&mut taken, &identifier(&name));
-                (name, of_cell(cell.cell_type()), false, unit)
+                (name, of_column(cell.column_type()), false, unit)
             });
             plain(package, &identifier(table), format!("/{package}/{table}"), fields)
         }
@@ -59,9 +62,9 @@ pub(super) fn schema(topic: Topic, rows: &BTreeMap<&'static str, Row>) -> Option
                 ("consumed", "Ah"),
                 ("temperature", "degC"),
             ];
-            let numbers = numbers.map(|(name, unit)| (name.to_owned(), Type::Float, false, unit));
+            let numbers = numbers.map(|(name, unit)| (name.to_owned(), FLOAT, false, unit));
             let fields = [("timestamp".to_owned(), TIMESTAMP, false, "")].into_iter().chain(numbers);
-            let fields = fields.chain([("cells".to_owned(), Type::Float, true, "V")]);
+            let fields = fields.chain([("cells".to_owned(), FLOAT, true, "V")]);
             plain("hums", "Battery", format!("/battery/{id}"), fields)
         }
         Topic::Position => foxglove("LocationFix", "/position"),
@@ -90,7 +93,7 @@ fn plain(
 
 fn with_time(package: &str, messages: &[Definition<'_>]) -> Vec<u8> {
     let mut out = Vec::new();
-    let time = ("Timestamp", fields(&[("seconds", Type::Int64), ("nanos", Type::Int32)]), None);
+    let time = ("Timestamp", fields(&[("seconds", INT64), ("nanos", INT32)]), None);
     file(&mut out, (TIME_FILE, "google.protobuf"), None, &[time]);
     file(&mut out, (&format!("{package}.proto"), package), Some(TIME_FILE), messages);
     out
@@ -108,28 +111,27 @@ fn fields(named: &[(&str, Type)]) -> Vec<Field> {
 
 /// One of Foxglove's schemas, with those of its fields that we know: the numbers are Foxglove's.
 fn foxglove(name: &str, topic: &str) -> Schema {
-    const VECTOR: Type = Type::Message(".foxglove.Vector3");
-    let double = |name| (name, Type::Double);
+    const VECTOR: Type = (MESSAGE, ".foxglove.Vector3");
+    let double = |name| (name, DOUBLE);
     let place = [
         double("latitude"),
         double("longitude"),
         double("altitude"),
         double("position_covariance"),
-        ("position_covariance_type", Type::Enum(".foxglove.LocationFix.PositionCovarianceType")),
+        ("position_covariance_type", (ENUM, ".foxglove.LocationFix.PositionCovarianceType")),
         ("timestamp", TIMESTAMP),
-        ("frame_id", Type::String),
+        ("frame_id", STRING),
     ];
     let place =
         fields(&place).into_iter().map(|field| Field { is_list: field.number == 4, ..field }).collect();
     let log = [
         ("timestamp", TIMESTAMP),
-        ("level", Type::Enum(".foxglove.Log.Level")),
-        ("message", Type::String),
-        ("name", Type::String),
+        ("level", (ENUM, ".foxglove.Log.Level")),
+        ("message", STRING),
+        ("name", STRING),
     ];
-    let pose =
-        [("timestamp", TIMESTAMP), ("frame_id", Type::String), ("pose", Type::Message(".foxglove.Pose"))];
-    let parts = [("position", VECTOR), ("orientation", Type::Message(".foxglove.Quaternion"))];
+    let pose = [("timestamp", TIMESTAMP), ("frame_id", STRING), ("pose", (MESSAGE, ".foxglove.Pose"))];
+    let parts = [("position", VECTOR), ("orientation", (MESSAGE, ".foxglove.Quaternion"))];
     let covariance: Enumeration =
         ("PositionCovarianceType", &["UNKNOWN", "APPROXIMATED", "DIAGONAL_KNOWN", "KNOWN"]);
     let level: Enumeration = ("Level", &["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"]);
@@ -153,22 +155,19 @@ fn identifier(name: &str) -> String {
 
 const fn of_kind(kind: Kind) -> Type {
     match kind {
-        Kind::U8 | Kind::U16 | Kind::U32 | Kind::U64 => Type::Uint64,
-        Kind::I8 | Kind::I16 | Kind::I32 | Kind::I64 => Type::Sint64,
-        Kind::F32 => Type::Float,
-        Kind::F64 => Type::Double,
-        Kind::Char => Type::String,
+        Kind::Char => STRING,
+        number => of_column(ColumnType::of(number)),
     }
 }
 
-const fn of_cell(cell: CellType) -> Type {
-    match cell {
-        CellType::Count => Type::Uint64,
-        CellType::Signed => Type::Sint64,
-        CellType::Single => Type::Float,
-        CellType::Double | CellType::Time => Type::Double,
-        CellType::Flag => Type::Bool,
-        CellType::Text => Type::String,
-        CellType::Hex => Type::Bytes,
+const fn of_column(kind: ColumnType) -> Type {
+    match kind {
+        ColumnType::Unsigned => UINT64,
+        ColumnType::Signed => SINT64,
+        ColumnType::Single => FLOAT,
+        ColumnType::Double => DOUBLE,
+        ColumnType::Flag => BOOL,
+        ColumnType::Text => STRING,
+        ColumnType::Bytes => BYTES,
     }
 }

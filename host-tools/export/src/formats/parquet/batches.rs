@@ -6,7 +6,8 @@ use hums_core::clock::Instant;
 use hums_link::Frame;
 
 use super::columns::TableRows;
-use crate::mavlink::values::Payload;
+use crate::context::Context;
+use crate::format::{Entry, GroupEncoder};
 use crate::row::{Cell, Row};
 use crate::table::Table;
 
@@ -36,14 +37,9 @@ fn table_of(frame: &Frame<'_>, known: bool) -> Table {
     }
 }
 
-impl Batches {
-    pub(crate) fn frame(
-        &mut self,
-        at: Instant,
-        utc_us: Option<u64>,
-        frame: &Frame<'_>,
-        known: Option<&Payload>,
-    ) {
+impl GroupEncoder for Batches {
+    fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
+        let Entry { at, utc_us, frame, known } = *entry;
         let table = table_of(frame, known.is_some());
         let columns = self.frames.entry(table).or_insert_with(|| {
             self.held_bytes += TABLE_BYTES;
@@ -57,20 +53,22 @@ impl Batches {
         columns.frame(at, utc_us, frame, known);
     }
 
-    pub(crate) fn row(&mut self, at: Instant, utc_us: Option<u64>, row: &Row) {
+    fn row(&mut self, context: &Context, at: Instant, row: &Row) {
         let texts = row.cells.iter().map(|(_, cell)| match cell {
             Cell::Text(text) | Cell::Words(text, _) => text.len(),
             Cell::Hex(bytes) => bytes.len(),
             _ => 0,
         });
         self.held_bytes += ROW_BYTES + CELL_BYTES * (1 + row.cells.len()) + texts.sum::<usize>();
-        self.rows.entry(row.table).or_default().push((at, utc_us, row.clone()));
+        self.rows.entry(row.table).or_default().push((at, context.epochs.utc_us(at), row.clone()));
     }
 
-    pub(crate) fn held_bytes(&self) -> usize {
+    fn held_bytes(&self) -> usize {
         self.held_bytes
     }
+}
 
+impl Batches {
     pub(crate) fn parts(self) -> (BTreeMap<Table, TableRows>, BTreeMap<&'static str, Vec<TimedRow>>) {
         (self.frames, self.rows)
     }

@@ -14,7 +14,8 @@ use parquet::schema::types::Type;
 use crate::field_names::free_name;
 use crate::hex::hex;
 use crate::mavlink::values::{FieldValue, Payload, Scalar};
-use crate::row::{Cell, CellType, Row, plain_name};
+use crate::row::{Cell, Row, plain_name};
+use crate::source::item::ColumnType;
 use crate::table::Table;
 
 /// The first two columns of every table: the vehicle, and the unique name of the recording.
@@ -61,16 +62,16 @@ impl Kind {
     }
 
     /// A column `value` holds quantities, whole ones too; `end_utc` is microseconds since 1970.
-    fn of_cell(name: &str, cell: CellType) -> Self {
+    fn of_cell(name: &str, cell: ColumnType) -> Self {
         match cell {
-            CellType::Count if name == "value" => Self::Double,
-            CellType::Count if name == "end_utc" => Self::Utc,
-            CellType::Count => Self::Unsigned(64),
-            CellType::Signed => Self::Signed(64),
-            CellType::Single => Self::Single,
-            CellType::Double | CellType::Time => Self::Double,
-            CellType::Flag => Self::Flag,
-            CellType::Text | CellType::Hex => Self::Text,
+            ColumnType::Unsigned if name == "value" => Self::Double,
+            ColumnType::Unsigned if name == "end_utc" => Self::Utc,
+            ColumnType::Unsigned => Self::Unsigned(64),
+            ColumnType::Signed => Self::Signed(64),
+            ColumnType::Single => Self::Single,
+            ColumnType::Double => Self::Double,
+            ColumnType::Flag => Self::Flag,
+            ColumnType::Text | ColumnType::Bytes => Self::Text,
         }
     }
 
@@ -185,7 +186,7 @@ impl Column {
         Self { units, enumeration, length, ..Self::new(name, Kind::of_field(field.kind)) }
     }
 
-    fn of_cell(name: &'static str, cell: CellType) -> Self {
+    fn of_cell(name: &'static str, cell: ColumnType) -> Self {
         let kind = Kind::of_cell(name, cell);
         let (plain, units) = plain_name(name);
         Self { units, ..Self::new(free_name(&plain, &TAKEN), kind).optional() }
@@ -249,12 +250,10 @@ impl Column {
         let scalar = match (self.kind, cell) {
             (Kind::Text, Some(Cell::Text(text))) => return self.push_text(text),
             (Kind::Text, Some(Cell::Hex(bytes))) => return self.push_text(&hex(bytes)),
-            (Kind::Unsigned(_) | Kind::Utc, Some(Cell::Count(value))) => Some(Scalar::Unsigned(*value)),
-            (Kind::Signed(_), Some(Cell::Signed(value))) => Some(Scalar::Signed(*value)),
-            (Kind::Single, Some(Cell::Single(value))) => Some(Scalar::Single(*value)),
-            (Kind::Double, Some(Cell::Double(value))) => Some(Scalar::Double(*value)),
-            (Kind::Double, Some(Cell::Single(value))) => Some(Scalar::Double(f64::from(*value))),
-            (Kind::Double, Some(Cell::Count(value))) => Some(Scalar::Double(*value as f64)),
+            (Kind::Unsigned(_) | Kind::Utc, Some(Cell::Number(number @ Scalar::Unsigned(_))))
+            | (Kind::Signed(_), Some(Cell::Number(number @ Scalar::Signed(_))))
+            | (Kind::Single, Some(Cell::Number(number @ Scalar::Single(_)))) => Some(*number),
+            (Kind::Double, Some(Cell::Number(number))) => Some(Scalar::Double(number.as_f64())),
             (Kind::Double, Some(Cell::Time(at))) => Some(Scalar::Double(at.as_secs_f64())),
             (Kind::Flag, Some(Cell::Flag(value))) => Some(Scalar::Unsigned(u64::from(*value))),
             _ => None,
@@ -403,7 +402,7 @@ impl TableRows {
 
     /// Columns for rows like this one.
     pub(super) fn of_rows(first: &Row) -> Self {
-        Self::new(first.cells.iter().map(|(name, cell)| Column::of_cell(name, cell.cell_type())), false)
+        Self::new(first.cells.iter().map(|(name, cell)| Column::of_cell(name, cell.column_type())), false)
     }
 
     fn begin(&mut self, at: Instant, utc_us: Option<u64>) -> impl Iterator<Item = &mut Column> {
@@ -483,6 +482,7 @@ impl TableRows {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::row::{count, text};
 
     #[test]
     fn every_message_fills_its_columns_which_have_different_names() {
@@ -512,15 +512,14 @@ mod tests {
 
     #[test]
     fn a_value_that_is_not_there_is_null_wherever_it_stands() {
-        let unknown = || Cell::Unknown(CellType::Count);
-        let text = |words: &str| Cell::Text(words.to_owned());
+        let unknown = || Cell::Unknown(ColumnType::Unsigned);
         let rows: Vec<Row> = [
             (unknown(), text("a")),
-            (Cell::Count(7), Cell::Unknown(CellType::Text)),
-            (Cell::Words("none".to_owned(), CellType::Count), text("")),
-            (Cell::Count(9), text("d\u{e9}")),
+            (count(7_u64), Cell::Unknown(ColumnType::Text)),
+            (Cell::Words("none".to_owned(), ColumnType::Unsigned), text("")),
+            (count(9_u64), text("d\u{e9}")),
         ]
-        .map(|(count, words)| Row::new("T", vec![("count[m]", count), ("words", words)]))
+        .map(|(number, words)| Row::new("T", vec![("count[m]", number), ("words", words)]))
         .into();
         let mut columns = TableRows::of_rows(&rows[0]);
         for row in &rows {

@@ -37,10 +37,10 @@ use parquet::schema::types::Type;
 use crate::context::Context;
 use crate::files::cannot_write;
 use crate::fleet::{Ended, SESSIONS, Session, sessions};
-use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Totals, Writer};
+use crate::format::GroupEncoder as _;
+use crate::format::{Files, Finished, FormatDetails, Totals, Writer};
 use crate::identity::Identity;
 use crate::logs::in_order::{in_order, workers};
-use crate::row::Row;
 use crate::story::Story;
 use crate::table::Table;
 use crate::utc::iso8601;
@@ -73,7 +73,7 @@ struct Limits {
     open_bytes: usize,
 }
 
-struct ParquetTables {
+pub(super) struct Parquet {
     session: Session,
     limits: Limits,
     properties: Properties,
@@ -113,7 +113,7 @@ impl Write for Buffer {
     }
 }
 
-impl ParquetTables {
+impl Parquet {
     fn new(session: Session, identity: &Identity) -> Self {
         let names = [("vehicle", &identity.vehicle), ("session", &identity.recording)];
         let about = names.map(|(name, value)| KeyValue::new(format!("hums.{name}"), value.clone())).into();
@@ -194,7 +194,7 @@ impl ParquetTables {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<(Session, usize)> {
+    fn end(mut self) -> Result<(Session, usize)> {
         let count = self.tables.len();
         let (session, properties) = (&self.session, &self.properties);
         let mut tables = std::mem::take(&mut self.tables).into_values();
@@ -206,22 +206,6 @@ impl ParquetTables {
         Ok((self.session, count))
     }
 }
-
-impl GroupEncoder for Batches {
-    fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
-        Self::frame(self, entry.at, entry.utc_us, entry.frame, entry.known);
-    }
-
-    fn row(&mut self, context: &Context, at: Instant, row: &Row) {
-        Self::row(self, at, context.epochs.utc_us(at), row);
-    }
-
-    fn held_bytes(&self) -> usize {
-        Self::held_bytes(self)
-    }
-}
-
-pub(super) struct Parquet(ParquetTables);
 
 impl Writer for Parquet {
     const ABOUT: FormatDetails = FormatDetails {
@@ -235,11 +219,11 @@ impl Writer for Parquet {
     type Encoder = Batches;
 
     fn open(context: &Context, _: &Path) -> Result<Self> {
-        Ok(Self(ParquetTables::new(Session::begin(context)?, &context.identity)))
+        Ok(Self::new(Session::begin(context)?, &context.identity))
     }
 
     fn part(&mut self, _: &Context, part: Batches, _: &Story) -> Result<()> {
-        self.0.put(part)
+        self.put(part)
     }
 
     fn finish(mut self, context: &Context, totals: Totals) -> Result<Finished> {
@@ -251,10 +235,10 @@ impl Writer for Parquet {
                 return Ok(Finished { made: Vec::new(), remarks });
             }
             let first = summary.first.unwrap_or(Instant::ZERO);
-            row.row(first, context.epochs.utc_us(first), &sessions::row(context, about));
-            self.0.put(row)?;
+            row.row(context, first, &sessions::row(context, about));
+            self.put(row)?;
         }
-        let (session, tables) = self.0.finish()?;
+        let (session, tables) = self.end()?;
         let path = session.path(SESSIONS, 1);
         let mut remarks = Vec::new();
         let files = match session.finish(context, totals.frames)? {
@@ -410,6 +394,7 @@ mod tests {
     use super::*;
     use crate::files::Inputs;
     use crate::fleet::Fleet;
+    use crate::format::Entry;
     use crate::mavlink::values::Payload;
 
     #[test]
@@ -427,7 +412,7 @@ mod tests {
                 ..Context::default()
             };
             let session = Session::begin(&context).expect("a session");
-            let mut tables = ParquetTables::new(session, &context.identity);
+            let mut tables = Parquet::new(session, &context.identity);
             tables.limits = limits;
             for second in 0..2000_u32 {
                 let mut batches = Batches::default();
@@ -436,16 +421,13 @@ mod tests {
                     let frame = Frame::again(&bytes, Check::Unverified).expect("a frame");
                     let message = hums_dialect::message(id.into());
                     let payload = message.map(|message| Payload::new(message, &[0x5a; 255]));
-                    batches.frame(
-                        Instant::from_millis(u64::from(second) * 1000),
-                        None,
-                        &frame,
-                        payload.as_ref(),
-                    );
+                    let at = Instant::from_millis(u64::from(second) * 1000);
+                    let entry = Entry { at, utc_us: None, frame: &frame, known: payload.as_ref() };
+                    batches.frame(&context, &entry);
                 }
                 tables.put(batches).expect("put");
             }
-            let (session, count) = tables.finish().expect("finish");
+            let (session, count) = tables.end().expect("ended");
             assert_eq!(count, 2);
             let paths: Vec<PathBuf> = (1..100).map(|part| session.path("ATTITUDE", part)).collect();
             let Ended::Alone(made) = session.finish(&context, 4000).expect("finish") else { panic!("alone") };

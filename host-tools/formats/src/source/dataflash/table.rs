@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::format::{ARRAY_LENGTH, FieldKind, Format};
 use super::message::Message;
+use crate::mavlink::values::Scalar;
 use crate::source::item::{CellValue, Column, ColumnType, Columns, Table};
 
 /// Tables of one name: a file may redefine it for ever.
@@ -94,17 +95,19 @@ pub(super) fn with_values<T>(message: &Message<'_>, take: impl FnOnce(&[CellValu
             values.extend((0..ARRAY_LENGTH).map(|element| {
                 message
                     .element(column, element)
-                    .map_or(CellValue::Unknown, |number| CellValue::Signed(number.into()))
+                    .map_or(CellValue::Unknown, |number| CellValue::Number(Scalar::Signed(number.into())))
             }));
             continue;
         }
         let value = match kind {
             ColumnType::Text => text.as_deref().map(CellValue::Text),
             ColumnType::Bytes => message.bytes(column).map(CellValue::Bytes),
-            ColumnType::Unsigned => message.unsigned(column).map(CellValue::Unsigned),
-            ColumnType::Signed => message.signed(column).map(CellValue::Signed),
-            ColumnType::Single => message.any_number(column).map(|number| CellValue::Single(number as f32)),
-            _ => message.any_number(column).map(CellValue::Double),
+            ColumnType::Unsigned => message.unsigned(column).map(Scalar::Unsigned).map(CellValue::Number),
+            ColumnType::Signed => message.signed(column).map(Scalar::Signed).map(CellValue::Number),
+            ColumnType::Single => {
+                message.any_number(column).map(|number| CellValue::Number(Scalar::Single(number as f32)))
+            }
+            _ => message.any_number(column).map(Scalar::Double).map(CellValue::Number),
         };
         let words = || message.no_number(column).map(CellValue::Text);
         values.push(value.or_else(words).unwrap_or(CellValue::Unknown));

@@ -62,7 +62,7 @@ impl Number {
     /// A value of as many bytes as the type has; the code of a character.
     pub(super) fn value(self, bytes: &[u8]) -> Option<CellValue<'static>> {
         match self {
-            Self::Of(kind) => Scalar::read(kind, bytes).map(CellValue::from),
+            Self::Of(kind) => Scalar::read(kind, bytes).map(CellValue::Number),
             Self::Bool => bytes.first().map(|byte| CellValue::Flag(*byte != 0)),
         }
     }

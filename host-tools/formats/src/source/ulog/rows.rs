@@ -4,6 +4,7 @@
 
 use super::format::{Field, Layout, Number};
 use super::message::words;
+use crate::mavlink::values::Scalar;
 use crate::source::item::{CellValue, ColumnType, Columns, Table};
 
 /// A topic's instance. There may be two batteries.
@@ -45,7 +46,7 @@ pub(super) fn table_name(layout: &Layout) -> String {
 
 pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<CellValue<'a>> {
     let mut values = Vec::with_capacity(layout.fields.len() + 1);
-    values.push(CellValue::Unsigned(u64::from(instance)));
+    values.push(CellValue::Number(Scalar::Unsigned(u64::from(instance))));
     for field in &layout.fields {
         let (at, bytes) = (field.offset as usize, field.number.bytes());
         if field.number == Number::CHAR {
@@ -142,7 +143,17 @@ mod tests {
                 .concat();
         let values = values(&layout, 2, &data);
         assert_eq!(values.len(), table.columns.len());
-        assert_eq!(values[..3], [CellValue::Unsigned(2), CellValue::Unsigned(7), CellValue::Single(1.5)]);
-        assert_eq!(values[4..], [CellValue::Text("ab"), CellValue::Flag(true), CellValue::Signed(-1)]);
+        assert_eq!(
+            values[..3],
+            [
+                CellValue::Number(Scalar::Unsigned(2)),
+                CellValue::Number(Scalar::Unsigned(7)),
+                CellValue::Number(Scalar::Single(1.5))
+            ]
+        );
+        assert_eq!(
+            values[4..],
+            [CellValue::Text("ab"), CellValue::Flag(true), CellValue::Number(Scalar::Signed(-1))]
+        );
     }
 }

@@ -18,6 +18,7 @@ use super::px4::{Px4, Report, Sample};
 use super::rows;
 use super::times;
 use super::topics::Subscriptions;
+use crate::mavlink::values::Scalar;
 use crate::source::buffer::Buffer;
 use crate::source::clock::{self, Clock, Reading, Stamp, WrongTimes};
 use crate::source::item::{
@@ -315,7 +316,8 @@ impl<'a, 'b> Session<'a, 'b> {
             self.tell(Item::Fact(Fact { about: FactKind::ProcessorFault, words: &words }))?;
         }
         let Some(table) = self.own.information.clone() else { return Ok(()) };
-        let number = value.number().map_or(CellValue::Unknown, CellValue::Double);
+        let number =
+            value.number().map_or(CellValue::Unknown, |number| CellValue::Number(Scalar::Double(number)));
         let text = text.map_or(CellValue::Unknown, CellValue::Text);
         self.tell(Item::Row(Row { table: &table, values: &[CellValue::Text(value.name), text, number] }))
     }
@@ -324,7 +326,7 @@ impl<'a, 'b> Session<'a, 'b> {
         let Some(number) = value.number() else { return Ok(()) };
         self.px4.parameter(value.name, number);
         if let Some(table) = self.own.parameters.clone() {
-            let values = [CellValue::Text(value.name), CellValue::Double(number)];
+            let values = [CellValue::Text(value.name), CellValue::Number(Scalar::Double(number))];
             self.tell(Item::Row(Row { table: &table, values: &values }))?;
         }
         self.tell(Item::Parameter(Parameter { name: value.name, value: number }))
@@ -333,7 +335,8 @@ impl<'a, 'b> Session<'a, 'b> {
     fn default(&mut self, groups: u8, value: &Keyed<'_>) -> Result<()> {
         let (Some(table), Some(number)) = (self.own.defaults.clone(), value.number()) else { return Ok(()) };
         let group = |bit: u8| CellValue::Flag(groups & bit != 0);
-        let values = [CellValue::Text(value.name), CellValue::Double(number), group(1), group(2)];
+        let values =
+            [CellValue::Text(value.name), CellValue::Number(Scalar::Double(number)), group(1), group(2)];
         self.tell(Item::Row(Row { table: &table, values: &values }))
     }
 
@@ -490,8 +493,9 @@ impl<'a, 'b> Session<'a, 'b> {
 
     fn text(&mut self, level: u8, tag: Option<u16>, time_us: u64, words: &str) -> Result<()> {
         if let Some(table) = self.own.texts.clone() {
-            let tag = tag.map_or(CellValue::Unknown, |tag| CellValue::Unsigned(u64::from(tag)));
-            let [level, time_us] = [u64::from(level), time_us].map(CellValue::Unsigned);
+            let tag =
+                tag.map_or(CellValue::Unknown, |tag| CellValue::Number(Scalar::Unsigned(u64::from(tag))));
+            let [level, time_us] = [u64::from(level), time_us].map(Scalar::Unsigned).map(CellValue::Number);
             self.tell(Item::Row(Row {
                 table: &table,
                 values: &[time_us, level, tag, CellValue::Text(words)],

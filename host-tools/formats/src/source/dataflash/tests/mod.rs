@@ -14,6 +14,7 @@ use hums_core::observation::{LandedState, Observation, VehicleKind};
 
 use self::writer::Writer;
 use super::*;
+use crate::mavlink::values::Scalar;
 use crate::source::item::{Amount, CellValue, Item, Rows};
 
 #[derive(Debug, Default)]
@@ -43,10 +44,10 @@ impl Seen {
                 }
                 let values = row.values.iter().map(|value| match value {
                     CellValue::Unknown => "?".to_owned(),
-                    CellValue::Unsigned(value) => value.to_string(),
-                    CellValue::Signed(value) => value.to_string(),
-                    CellValue::Single(value) => value.to_string(),
-                    CellValue::Double(value) => value.to_string(),
+                    CellValue::Number(Scalar::Unsigned(value)) => value.to_string(),
+                    CellValue::Number(Scalar::Signed(value)) => value.to_string(),
+                    CellValue::Number(Scalar::Single(value)) => value.to_string(),
+                    CellValue::Number(Scalar::Double(value)) => value.to_string(),
                     CellValue::Flag(value) => value.to_string(),
                     CellValue::Text(value) => (*value).to_owned(),
                     CellValue::Bytes(value) => format!("{value:02x?}"),

@@ -2,6 +2,7 @@
 
 use hums_core::clock::Instant;
 
+use crate::mavlink::values::Scalar;
 use crate::source::item::{CellValue, Gap, Item, Needs, Reader, RecordingSummary, Rows};
 use crate::source::ulog::Ulog;
 
@@ -141,10 +142,10 @@ fn told(item: &Item<'_>) -> String {
 fn value(value: &CellValue<'_>) -> String {
     match value {
         CellValue::Unknown => String::new(),
-        CellValue::Unsigned(number) => number.to_string(),
-        CellValue::Signed(number) => number.to_string(),
-        CellValue::Single(number) => number.to_string(),
-        CellValue::Double(number) => number.to_string(),
+        CellValue::Number(Scalar::Unsigned(number)) => number.to_string(),
+        CellValue::Number(Scalar::Signed(number)) => number.to_string(),
+        CellValue::Number(Scalar::Single(number)) => number.to_string(),
+        CellValue::Number(Scalar::Double(number)) => number.to_string(),
         CellValue::Flag(flag) => flag.to_string(),
         CellValue::Text(text) => (*text).to_owned(),
         CellValue::Bytes(bytes) => format!("{bytes:02x?}"),
