@@ -14,9 +14,8 @@ use crate::ending::{
     unprotected_words,
 };
 use crate::files::Inputs;
-use crate::followed::EndResolver;
+use crate::info::each::read_each;
 use crate::logs::sessions::Sessions;
-use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, FoundLogs, find::Image};
 use crate::loss;
 use crate::outcome::Outcome;
@@ -152,20 +151,9 @@ impl Totals {
 }
 
 /// Hands each log on in order. Returns the number of unreadable ones, which are reported.
-pub fn verify_each(found: &FoundLogs, mut done: impl FnMut(&Overview) -> Result<()>) -> Result<u64> {
+pub fn verify_each(found: &FoundLogs, done: impl FnMut(&Overview) -> Result<()>) -> Result<u64> {
     let named = found.logs.iter().map(|log| (log.name.as_str(), log));
-    let mut followed = EndResolver::new(Sessions::of(named));
-    let mut failed = 0;
-    side_by_side(&found.logs, Overview::verified, |overview| match overview {
-        Ok(overview) => followed.push(overview).iter().try_for_each(&mut done),
-        Err(error) => {
-            failed += 1;
-            note!("{error:#}");
-            Ok(())
-        }
-    })?;
-    followed.finish().try_for_each(|overview| done(&overview))?;
-    Ok(failed)
+    read_each(&found.logs, Sessions::of(named), Overview::verified, false, done)
 }
 
 /// A log's verdict.

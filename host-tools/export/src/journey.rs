@@ -3,11 +3,10 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use hums_analysis::track::Track;
+use hums_analysis::track::{Point, Track};
 use hums_core::clock::{Instant, Span};
 use hums_core::units::Position;
 
-use crate::checked::finding_words;
 use crate::context::Context;
 use crate::format::GroupEncoder;
 use crate::motion::{Fix, Motion};
@@ -47,16 +46,6 @@ pub(crate) struct Journey {
     pub(crate) fixes: u64,
 }
 
-pub(crate) struct PlacedFinding<'a> {
-    pub(crate) at: Instant,
-    pub(crate) latitude_deg: f64,
-    pub(crate) longitude_deg: f64,
-    pub(crate) altitude_m: f32,
-    pub(crate) name: String,
-    pub(crate) words: String,
-    pub(crate) finding: &'a Finding,
-}
-
 impl Journey {
     /// `each` gets the places of the wanted time, and whether the track begins again with it.
     pub(crate) fn take(
@@ -90,20 +79,12 @@ impl Journey {
         Ok(())
     }
 
-    pub(crate) fn placed(&self) -> impl Iterator<Item = PlacedFinding<'_>> {
+    /// Each finding with its place.
+    pub(crate) fn placed(&self) -> impl Iterator<Item = (&Point, &Finding)> {
         let points = self.track.points();
         self.findings.iter().filter_map(move |finding| {
             let after = points.partition_point(|point| point.at <= finding.at);
-            let point = points.get(after.saturating_sub(1))?;
-            Some(PlacedFinding {
-                at: finding.at,
-                latitude_deg: point.latitude_deg,
-                longitude_deg: point.longitude_deg,
-                altitude_m: point.height_m.unwrap_or(0.0),
-                name: finding.name(),
-                words: finding_words(finding),
-                finding,
-            })
+            Some((points.get(after.saturating_sub(1))?, finding))
         })
     }
 

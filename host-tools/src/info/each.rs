@@ -4,6 +4,7 @@ use anyhow::{Result, bail};
 
 use crate::check;
 use crate::followed::{EndResolver, HELD_MAX};
+use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::Outcome;
 use crate::plural::count;
@@ -42,8 +43,7 @@ pub(super) fn each(
         note!("{error:#}");
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
-    let mut followed = EndResolver::new(sessions_of(&found.places));
-    let mut done = |overview: &Overview| {
+    let done = |overview: &Overview| {
         if name.is_some_and(|name| overview.ending.name != *name) {
             return Ok(());
         }
@@ -51,8 +51,22 @@ pub(super) fn each(
         show(overview)
     };
     let inputs_failed = found.failed.len();
-    let (mut failed, is_one) = (inputs_failed as u64, places.len() + inputs_failed == 1);
-    side_by_side(places, check::overview, |overview| match overview {
+    let all = places.len() + inputs_failed;
+    let failed = read_each(places, sessions_of(&found.places), check::overview, all == 1, done)?;
+    Ok(Read { outcome, failed: failed + inputs_failed as u64, all })
+}
+
+/// Hands each on in order, with the others' evidence about its end. Returns the number of unreadable ones, which are
+/// reported; of `is_one` it is an error.
+pub fn read_each<P: Sync>(
+    places: &[P],
+    sessions: Sessions,
+    read: impl Fn(&P) -> Result<Overview> + Sync,
+    is_one: bool,
+    mut done: impl FnMut(&Overview) -> Result<()>,
+) -> Result<u64> {
+    let (mut followed, mut failed) = (EndResolver::new(sessions), 0);
+    side_by_side(places, read, |overview| match overview {
         Ok(overview) => followed.push(overview).iter().try_for_each(&mut done),
         Err(error) if is_one => Err(error),
         Err(error) => {
@@ -62,5 +76,5 @@ pub(super) fn each(
         }
     })?;
     followed.finish().try_for_each(|overview| done(&overview))?;
-    Ok(Read { outcome, failed, all: places.len() + inputs_failed })
+    Ok(failed)
 }

@@ -1,7 +1,7 @@
 //! `hums info`, for people and as JSON.
 
 pub mod due;
-mod each;
+pub mod each;
 mod list;
 mod number;
 mod text;

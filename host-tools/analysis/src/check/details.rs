@@ -312,19 +312,8 @@ pub(super) fn reported(at: Instant, (name, value): (&str, f32), params: &Params)
     let limited = |check: &'static Check| Some((check, params.get(check.limits.critical?)));
     let found = checks().find(|check| check.name == name).and_then(limited);
     let Some((check, limit)) = found.filter(|(_, limit)| value > *limit) else { return Vec::new() };
-    let change = |previous, level| Finding {
-        at,
-        subsystem: check.subsystem,
-        check: name.to_owned(),
-        instance: 0,
-        level,
-        previous,
-        value,
-        worst: None,
-        limit,
-        unit: check.unit.name().to_owned(),
-    };
-    vec![change(Level::Ok, Level::Critical), change(Level::Critical, Level::Ok)]
+    let change = |change| Finding::of(check, at, change, value, limit);
+    vec![change((Level::Ok, Level::Critical)), change((Level::Critical, Level::Ok))]
 }
 
 #[cfg(test)]

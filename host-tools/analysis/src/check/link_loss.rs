@@ -79,18 +79,8 @@ impl Verdict {
     pub(super) fn finding(&self, at: clock::Instant, level: Level, params: &Params) -> Option<Finding> {
         let check = checks().find(|check| check.name == self.check)?;
         let limit = check.limits.critical.map(|limit| params.get(limit)).filter(|limit| limit.is_finite())?;
-        Some(Finding {
-            at,
-            subsystem: check.subsystem,
-            check: self.check.to_owned(),
-            instance: 0,
-            level,
-            previous: if level == Level::Critical { Level::Ok } else { Level::Critical },
-            value: self.value.unwrap_or(f32::NAN),
-            worst: None,
-            limit,
-            unit: check.unit.name().to_owned(),
-        })
+        let previous = if level == Level::Critical { Level::Ok } else { Level::Critical };
+        Some(Finding::of(check, at, (previous, level), self.value.unwrap_or(f32::NAN), limit))
     }
 }
 

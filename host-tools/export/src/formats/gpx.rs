@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::Result;
 
+use crate::checked::finding_words;
 use crate::context::Context;
 use crate::format::{Files, Finished, FormatDetails, SingleFile, Spool, Totals, Writer};
 use crate::journey::{CollectedFindings, Journey, push_element, utc};
@@ -64,20 +65,22 @@ impl Writer for Gpx {
         ));
         self.file.write(out.as_bytes())?;
         let mut findings = 0;
-        for placed in self.journey.placed() {
+        for (place, finding) in self.journey.placed() {
             findings += 1;
             out.clear();
             let _ = write!(
                 out,
                 "<wpt lat=\"{:.7}\" lon=\"{:.7}\"><ele>{:.2}</ele>",
-                placed.latitude_deg, placed.longitude_deg, placed.altitude_m
+                place.latitude_deg,
+                place.longitude_deg,
+                place.height_m.unwrap_or(0.0)
             );
-            if let Some(time) = utc(context, placed.at) {
+            if let Some(time) = utc(context, finding.at) {
                 push_element(&mut out, "time", &time);
             }
-            push_element(&mut out, "name", &placed.name);
-            push_element(&mut out, "desc", &placed.words);
-            push_element(&mut out, "type", placed.finding.level.name());
+            push_element(&mut out, "name", &finding.name());
+            push_element(&mut out, "desc", &finding_words(finding));
+            push_element(&mut out, "type", finding.level.name());
             out.push_str("</wpt>\n");
             self.file.write(out.as_bytes())?;
         }

@@ -6,6 +6,7 @@ use std::path::Path;
 use anyhow::Result;
 use hums_core::clock::Instant;
 
+use crate::checked::finding_words;
 use crate::context::Context;
 use crate::format::{Files, Finished, FormatDetails, SingleFile, Totals, Writer};
 use crate::journey::{CollectedFindings, Journey, push_element, utc};
@@ -112,22 +113,24 @@ impl Writer for Kml {
         self.end_piece(context, false)?;
         let mut findings = 0;
         let mut out = String::new();
-        for placed in self.journey.placed() {
+        for (place, finding) in self.journey.placed() {
             findings += 1;
             out.clear();
             out.push_str("<Placemark>");
-            push_element(&mut out, "name", &placed.name);
-            push_element(&mut out, "description", &placed.words);
-            if let Some(time) = utc(context, placed.at) {
+            push_element(&mut out, "name", &finding.name());
+            push_element(&mut out, "description", &finding_words(finding));
+            if let Some(time) = utc(context, finding.at) {
                 out.push_str("<TimeStamp>");
                 push_element(&mut out, "when", &time);
                 out.push_str("</TimeStamp>");
             }
-            push_element(&mut out, "styleUrl", &format!("#{}", placed.finding.level.name()));
+            push_element(&mut out, "styleUrl", &format!("#{}", finding.level.name()));
             let _ = writeln!(
                 out,
                 "<Point><altitudeMode>absolute</altitudeMode><coordinates>{:.7},{:.7},{:.2}</coordinates></Point></Placemark>",
-                placed.longitude_deg, placed.latitude_deg, placed.altitude_m
+                place.longitude_deg,
+                place.latitude_deg,
+                place.height_m.unwrap_or(0.0)
             );
             self.file.write(out.as_bytes())?;
         }

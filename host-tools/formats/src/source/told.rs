@@ -4,7 +4,7 @@ use hums_blackbox::Record;
 use hums_blackbox::record::{FindingRecord, LossKind, RecordReason};
 use hums_core::clock::Instant;
 use hums_core::component::{COMPONENTS_MAX, Component, Label};
-use hums_core::health::{self, Level, Orders, Subsystem, check_named};
+use hums_core::health::{self, Check, Level, Orders, Subsystem, check_named};
 use hums_core::observation::Feeds;
 use hums_onboard::monitoring::CELLS_UNKNOWN;
 use hums_onboard::persist::STORE_NEW;
@@ -89,6 +89,22 @@ impl Finding {
     /// Unjudged: after landing the check no longer applies, and is not known to be good.
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok && self.value.is_nan()
+    }
+
+    /// Of a check's only part.
+    pub fn of(check: &Check, at: Instant, (previous, level): (Level, Level), value: f32, limit: f32) -> Self {
+        Self {
+            at,
+            subsystem: check.subsystem,
+            check: check.name.to_owned(),
+            instance: 0,
+            level,
+            previous,
+            value,
+            worst: None,
+            limit,
+            unit: check.unit.name().to_owned(),
+        }
     }
 
     /// As the box has it; `None` of a check that no box makes.
