@@ -2,6 +2,7 @@
 
 use std::io::Write as _;
 
+use hums::mavlink::values::Scalar;
 use hums::source::item::{CellValue, Item, Needs, Row, Rows};
 use hums::source::recording::LogPlace;
 use hums_tests::{flights, oracle};
@@ -10,14 +11,16 @@ use serde_json::Value as Json;
 fn same(ours: &CellValue<'_>, theirs: &Json) -> bool {
     match ours {
         CellValue::Unknown => theirs.is_null(),
-        CellValue::Unsigned(value) => theirs.as_u64() == Some(*value),
-        CellValue::Signed(value) => theirs.as_i64() == Some(*value),
+        CellValue::Number(Scalar::Unsigned(value)) => theirs.as_u64() == Some(*value),
+        CellValue::Number(Scalar::Signed(value)) => theirs.as_i64() == Some(*value),
         // JSON has no number for it.
-        CellValue::Single(value) if !value.is_finite() => theirs.is_null(),
-        CellValue::Double(value) if !value.is_finite() => theirs.is_null(),
-        CellValue::Single(value) => theirs.as_f64().map(|theirs| theirs as f32) == Some(*value),
+        CellValue::Number(Scalar::Single(value)) if !value.is_finite() => theirs.is_null(),
+        CellValue::Number(Scalar::Double(value)) if !value.is_finite() => theirs.is_null(),
+        CellValue::Number(Scalar::Single(value)) => {
+            theirs.as_f64().map(|theirs| theirs as f32) == Some(*value)
+        }
         // `serde_json` reads a number to its last bit but one.
-        CellValue::Double(value) => {
+        CellValue::Number(Scalar::Double(value)) => {
             theirs.as_f64().is_some_and(|theirs| (theirs - value).abs() <= 2.0 * f64::EPSILON * value.abs())
         }
         CellValue::Flag(value) => theirs.as_bool() == Some(*value),

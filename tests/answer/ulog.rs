@@ -5,6 +5,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
+use hums::mavlink::values::Scalar;
 use hums::source::item::{Cause, CellValue, Item, Needs, Row, Rows};
 use hums::source::recording::LogPlace;
 use hums_tests::{flights, oracle};
@@ -27,9 +28,10 @@ fn write(log: &Path, folder: &Path) {
     let want = Needs { rows: Rows::All, ..Needs::default() };
     let take = &mut |_, item: Item<'_>| {
         match item {
-            Item::Row(Row { table, values: &[CellValue::Text(name), CellValue::Double(value)] })
-                if table.name == "parameters" =>
-            {
+            Item::Row(Row {
+                table,
+                values: &[CellValue::Text(name), CellValue::Number(Scalar::Double(value))],
+            }) if table.name == "parameters" => {
                 parameters.insert(name.to_owned(), value);
             }
             Item::Row(Row { table, values: &[.., CellValue::Text(words)] })
@@ -67,10 +69,10 @@ fn write(log: &Path, folder: &Path) {
 fn bits(value: &CellValue<'_>) -> u64 {
     match *value {
         CellValue::Unknown | CellValue::Text(_) | CellValue::Bytes(_) => 0,
-        CellValue::Unsigned(number) => number,
-        CellValue::Signed(number) => number as u64,
-        CellValue::Single(number) => u64::from(number.to_bits()),
-        CellValue::Double(number) => number.to_bits(),
+        CellValue::Number(Scalar::Unsigned(number)) => number,
+        CellValue::Number(Scalar::Signed(number)) => number as u64,
+        CellValue::Number(Scalar::Single(number)) => u64::from(number.to_bits()),
+        CellValue::Number(Scalar::Double(number)) => number.to_bits(),
         CellValue::Flag(flag) => u64::from(flag),
     }
 }
