@@ -626,7 +626,8 @@ fn a_packed_recording_has_the_times_the_damage_and_the_joints_that_check_sees() 
     write("damaged.tlog", &[&tlog[..middle], &[7; 100], &tlog[middle + 300..]].concat());
     // The same vehicle, a day earlier.
     write("joined.tlog", &[tlog.clone(), with_times(&tlog, |_, us| us - 86_400_000_000)].concat());
-    for (name, code) in [("flight.raw", 0), ("damaged.tlog", 3), ("joined.tlog", 0)] {
+    write("cut.tlog", &tlog[..tlog.len() - 5]);
+    for (name, code) in [("flight.raw", 0), ("damaged.tlog", 3), ("joined.tlog", 0), ("cut.tlog", 0)] {
         run(dir.path(), &format!("decode --format hum {name} -o {name}.hum"), code);
         let of = |input: &str| {
             let checked = json(&attempt(dir.path(), &format!("check --json {input}")));
@@ -644,6 +645,7 @@ fn a_packed_recording_has_the_times_the_damage_and_the_joints_that_check_sees() 
         assert_eq!((&plain.1, plain.2), (&packed.1, packed.2), "{name}");
     }
     run(dir.path(), "check damaged.tlog.hum", 3);
+    run(dir.path(), "info cut.tlog.hum", 0);
     run(dir.path(), "sim damaged.tlog --sd card.img", 3);
     // A frame whose checksum does not fit is damage of a tlog too.
     let first = frames_of(&px4())[0].len();

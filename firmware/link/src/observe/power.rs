@@ -23,16 +23,16 @@ pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
     // Function, type, charge state and mode; the rest of the message does not depend on them.
     let battery = read::<ap::BATTERY_STATUS_DATA>(payload, &[33, 34, 40, 49])?;
     let (voltage, cells) = cells(&battery.voltages, battery.voltages_ext);
-    let current = current(battery.current_battery);
+    let is_measured = voltage.is_some() || battery.current_battery >= 0;
     Some(Battery {
         id: battery.id,
         voltage,
         cells,
-        current,
+        current: current(battery.current_battery),
         // -1 is unknown; PX4 scales its own -1 and then sends other negative numbers.
         consumed: (battery.current_consumed >= 0).then(|| AmpereHours(battery.current_consumed as f32 / 1e3)),
-        // ArduPilot sends 0 % of a battery that it does not measure.
-        remaining: percent(battery.battery_remaining).filter(|_| voltage.is_some() || current.is_some()),
+        // ArduPilot sends 0 % for a battery without a monitor.
+        remaining: percent(battery.battery_remaining).filter(|part| part.0 > 0.0 || is_measured),
         temperature: (battery.temperature != i16::MAX)
             .then(|| Celsius(f32::from(battery.temperature) / 100.0)),
         faults: battery.fault_bitmask.bits(),

@@ -147,21 +147,23 @@ fn unknown_system_status_is_none_of_the_values() {
 }
 
 fn battery(voltages: [u16; 10], voltages_ext: [u16; 4]) -> hums_core::observation::Battery {
-    let message = ap::BATTERY_STATUS_DATA { voltages, voltages_ext, ..Default::default() };
+    let message =
+        ap::BATTERY_STATUS_DATA { voltages, voltages_ext, current_battery: -1, ..Default::default() };
     let Some(Observation::Battery(battery)) = said(&message) else { panic!() };
     battery
 }
 
 #[test]
-fn a_sum_in_the_first_cell_is_no_cell() {
+fn a_sum_is_no_cell_and_nothing_measured_is_no_charge() {
     const NONE: u16 = u16::MAX;
     let sum = battery([12_600, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE], [0; 4]);
-    assert_eq!((sum.voltage, sum.cells_reported()), (Some(Volts(12.6)), 0));
+    assert_eq!((sum.voltage, sum.remaining), (Some(Volts(12.6)), Some(Fraction(0.0))));
+    assert_eq!(sum.cells_reported(), 0);
     // Above 65.534 V the rest is in the next place.
     let spilled = battery([65_534, 4_466, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE], [0; 4]);
     assert_eq!((spilled.voltage, spilled.cells_reported()), (Some(Volts(70.0)), 0));
     let none = battery([NONE; 10], [0; 4]);
-    assert_eq!((none.voltage, none.cells_reported()), (None, 0));
+    assert_eq!((none.voltage, none.cells_reported(), none.remaining), (None, 0, None));
 }
 
 #[test]
@@ -182,13 +184,10 @@ fn battery_figures_have_their_own_scales_and_unknowns() {
         ..Default::default()
     };
     let Some(Observation::Battery(known)) = said(&message) else { panic!() };
-    assert_eq!(
-        (known.current, known.remaining, known.temperature),
-        (Some(Amperes(27.34)), Some(Fraction(0.86)), None)
-    );
+    assert_eq!((known.current, known.temperature), (Some(Amperes(27.34)), None));
     let unknown = ap::BATTERY_STATUS_DATA { current_consumed: -29, current_battery: -1, ..message };
     let Some(Observation::Battery(unknown)) = said(&unknown) else { panic!() };
-    assert_eq!((unknown.consumed, unknown.current, unknown.remaining), (None, None, None));
+    assert_eq!((unknown.consumed, unknown.current, unknown.remaining), (None, None, Some(Fraction(0.86))));
 }
 
 #[test]

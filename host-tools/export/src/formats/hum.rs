@@ -46,11 +46,16 @@ pub(super) const FORMAT: Format = Format {
 fn run(args: &Decode) -> Result<Outcome> {
     check(args)?;
     let found = find(&args.inputs, false)?;
-    let [place] = found.places.as_slice() else { return Err(not_one()) };
+    found.tell();
+    let [place] = found.places.as_slice() else {
+        bail!("{} recordings were found; --format hum is for one: name its file", found.places.len());
+    };
     let recording = place.open()?;
     if place.own().is_some() || !recording.format.is_of_link() {
         let (title, what) = (&place.title, recording.format.with_article());
-        bail!("{title}: is {what}; --format hum is for a recording of a link, a tlog or raw MAVLink");
+        bail!(
+            "{title}: is {what}, which --format hum does not pack (a tlog or raw MAVLink); hums reads it as it is"
+        );
     }
     let inputs = found.with_inputs(&args.inputs).forcing(args.force);
     let context = Context { inputs: inputs.into(), ..Context::default() };
@@ -61,7 +66,8 @@ fn run(args: &Decode) -> Result<Outcome> {
     let mut done = Done::read(place, summary, packer.lacks);
     done.remarks.extend(packer.words.iter().map(|words| format!("{}: {words}", place.title)));
     done.made.push(packer.finish(&place.title)?);
-    let (outcome, mut json) = (done.outcome(), args.json.then(MadeJson::default));
+    let mut json = args.json.then(MadeJson::default);
+    let outcome = done.outcome().max(Outcome::lossy(found.is_lossy()));
     done.tell(json.as_mut(), 1)?;
     json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
     Ok(outcome)
@@ -79,7 +85,7 @@ fn check(args: &Decode) -> Result<()> {
 
 fn not_one() -> anyhow::Error {
     usage(
-        "--format hum writes all of one recording, and no other format beside it; leave out --session, --from, --to, --split and --message",
+        "--format hum writes all of one recording, and no other format beside it: name one file, and no --session, --from, --to, --split or --message",
     )
 }
 
@@ -118,7 +124,8 @@ struct Packer {
     hashed_bytes: usize,
     /// The session's number, once the first frames are known.
     session: Option<u32>,
-    has_clock: bool,
+    /// After a restart the times of the log have no UTC: it has one for all of them.
+    is_later_part: bool,
     last: Instant,
     log_bytes: u64,
     lacks: Soundness,
@@ -134,7 +141,7 @@ impl Packer {
             hash: Sha256::new(),
             hashed_bytes: 0,
             session: None,
-            has_clock: false,
+            is_later_part: false,
             last: Instant::ZERO,
             log_bytes: 0,
             lacks: Soundness::Whole,
@@ -155,12 +162,19 @@ impl Packer {
                 self.writer.frame(self.last, frame.bytes(), verified, &mut self.finished)?;
                 if self.hashed_bytes >= FIRST_BYTES { self.write_out() } else { Ok(()) }
             }
-            Item::Epoch(utc_micros) if !std::mem::replace(&mut self.has_clock, true) => {
+            Item::Epoch(utc_micros) if !self.is_later_part => {
                 self.hash.update(utc_micros.to_le_bytes());
                 let clock = Clock { boot: Instant::ZERO, utc_micros, source: FROM_RECORDING };
                 self.record(self.last, &Record::Clock(clock))
             }
-            Item::Joint => self.record(self.last, &Record::Note(Note { severity: 6, text: JOINED })),
+            Item::Restart => {
+                self.is_later_part = true;
+                Ok(())
+            }
+            Item::Joint => {
+                self.is_later_part = true;
+                self.record(self.last, &Record::Note(Note { severity: 6, text: JOINED }))
+            }
             Item::Gap(gap) => self.gap(gap),
             _ => Ok(()),
         }
@@ -175,7 +189,7 @@ impl Packer {
         let (what, count) = match frames {
             _ if gap.is_noise() => (LossKind::NotFrames, gap.bytes),
             Some(frames) => (LossKind::WrongChecksums, frames.into()),
-            None if gap.cause == Cause::NotKept => return Ok(()),
+            None if matches!(gap.cause, Cause::NotKept | Cause::Cut) => return Ok(()),
             None => (LossKind::DamagedPlaces, 1),
         };
         let (from, to) = (gap.from.unwrap_or(Instant::ZERO), gap.to.unwrap_or(self.last));
