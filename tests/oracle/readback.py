@@ -8,7 +8,7 @@ and InfluxDB (INFLUXD is the program), which takes every point of the line proto
 Numbers must equal pymavlink's: each format prints digits that read back as the same number. Times are compared with
 those before the frames of a tlog: seconds since the first one, to the millisecond, and UTC, which is the first one's
 plus these seconds. A raw recording has no times. Its frames have those of the autopilot's messages, to a tenth of a second;
-before the first of these they come as on a line at 115,200 baud, up to 32 bytes together. UTC is unknown.
+before the first of these they come as on a line at 115,200 baud, up to 32 bytes together. UTC is that of SYSTEM_TIME, to a tenth of a second.
 """
 
 import collections
@@ -53,6 +53,8 @@ class Arrival:
         self.late = 0
         # For a raw recording: the source of the time, its first time, and its arrival.
         self.teller = None
+        # UTC of the first frame, by SYSTEM_TIME.
+        self.told = None
 
     def byte(self, place, message):
         """For a raw recording: the number of bytes so far, and the message of the last one."""
@@ -66,6 +68,8 @@ class Arrival:
             _, first_ms, base = self.teller
             self.at = max(self.at, base + (message.time_boot_ms - first_ms) * 1000)
             self.late = TOLD_LATE_US
+            if self.told is None and message.get_msgId() == 2 and message.time_unix_usec > 0:
+                self.told = message.time_unix_usec - self.at
 
     def entry(self, time_us):
         if self.first is None:
@@ -136,8 +140,11 @@ class Comparison:
     """Counts comparisons, and stores the first differences."""
 
     def __init__(self, arrival):
-        """`first_us` is UTC of the first frame, in microseconds since 1970; None if the recording has no times."""
+        """`first_us` is UTC of the first frame, in microseconds since 1970; None if nothing says it."""
         self.first_us, self.late = arrival.first, arrival.late
+        self.utc_late = 0
+        if self.first_us is None and arrival.told is not None:
+            self.first_us, self.utc_late = arrival.told, TOLD_LATE_US
         self.values = collections.Counter()
         self.times = collections.Counter()
         self.differences = []
@@ -161,7 +168,8 @@ class Comparison:
         self.times[form] += 1
         boot_us = round(float(boot_s) * SECOND_US)
         expected = None if self.first_us is None else self.first_us + boot_us
-        in_order = boot_us % 1000 == 0 and self.in_time(boot_us - message["at"]) and utc_us == expected
+        is_utc = utc_us == expected or (None not in (utc_us, expected) and abs(utc_us - expected) < self.utc_late)
+        in_order = boot_us % 1000 == 0 and self.in_time(boot_us - message["at"]) and is_utc
         if not in_order and len(self.differences) < 20:
             self.differences.append(
                 f"{form} {name}: came {message['at']} us after {self.first_us}, became {boot_s} s, {utc_us}")
@@ -174,7 +182,8 @@ class Comparison:
         """The time of a point: UTC, or the time since the first frame; points of one millisecond are moved apart."""
         self.times["influx"] += 1
         came = (self.first_us or 0) + message["at"]
-        if not self.in_time(ns / 1000 - came) and len(self.differences) < 20:
+        in_time = -self.utc_late < ns / 1000 - came < self.utc_late or self.in_time(ns / 1000 - came)
+        if not in_time and len(self.differences) < 20:
             self.differences.append(f"influx {name}: came at {came} us, became {ns} ns")
 
     def equal(self, what, expected, found):

@@ -99,7 +99,8 @@ pub fn parameters(dir: &Path, count: u32) -> PathBuf {
 
 /// Unknown messages, each with its own id.
 pub fn unknown_ids(dir: &Path, count: u32) -> PathBuf {
-    let mut raw = HEARTBEAT.to_vec();
+    // One would not make it a recording.
+    let mut raw = HEARTBEAT.repeat(10);
     for number in 0..count {
         let [low, middle, high, _] = (70_000 + number).to_le_bytes();
         let mut frame = vec![0xfd, 1, 0, 0, number as u8, 1, 1, low, middle, high, 1];
