@@ -48,7 +48,7 @@ fn assert_all_recorded(rig: &Rig) {
     assert_eq!(rig.compared(), wanted);
 }
 
-/// Since the last call.
+/// In what the ground station's port sent since the last call.
 #[track_caller]
 fn assert_heard(rig: &mut Rig, told: &str) {
     let heard: Vec<u8> = rig.machine.take_sent(1).into_iter().map(|(_, byte)| byte).collect();

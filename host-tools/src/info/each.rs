@@ -56,8 +56,8 @@ pub(super) fn each(
     Ok(Read { outcome, failed: failed + inputs_failed as u64, all })
 }
 
-/// Hands each on in order, with the others' evidence about its end. Returns the number of unreadable ones, which are
-/// reported; of `is_one` it is an error.
+/// Hands each log on in order, with the other logs' evidence about its end. Returns the number of unreadable logs, which
+/// are reported. With `is_one` an unreadable log is an error.
 pub fn read_each<P: Sync>(
     places: &[P],
     sessions: Sessions,

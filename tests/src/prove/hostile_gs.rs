@@ -47,7 +47,7 @@ const COMPONENT: u8 = 191;
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let seconds = options.runs(24 * 3600, 120);
-    let mut figures = Figures::with(&["in half of these hours each", "without a key", "with a key"]);
+    let mut figures = Figures::with(&["figure, each over half of the hours", "without a key", "with a key"]);
     figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
     // Half of the time the key is needed.
     let [without, with] = [("without a key", None), ("with a key", Some(KEY))].map(|(name, key)| {

@@ -91,7 +91,7 @@ impl Finding {
         self.level == Level::Ok && self.value.is_nan()
     }
 
-    /// Of a check's only part.
+    /// The finding of a check that judges one part only.
     pub fn of(check: &Check, at: Instant, (previous, level): (Level, Level), value: f32, limit: f32) -> Self {
         Self {
             at,

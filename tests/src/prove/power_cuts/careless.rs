@@ -62,7 +62,7 @@ const COLUMNS: [&str; 11] = [
     "of these without a report",
     "frames lost outside spoiled groups",
     "next power-on: recorded completely",
-    "not recorded, and the box reports why",
+    "next power-on: not recorded, and the box reports why",
     "sectors of the session before overwritten: the oldest file's new name was lost",
     "other readable sectors of earlier sessions overwritten",
 ];

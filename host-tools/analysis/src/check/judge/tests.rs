@@ -51,7 +51,7 @@ fn finding(check: &'static str, at_ms: u64, level: Level, value: f32) -> Finding
     }
 }
 
-/// The judge learns of it at its end.
+/// A gap, which the judge receives at the gap's end.
 fn miss(judge: &mut Judge, from_ms: u64, to_ms: u64, cause: Why) {
     let [from, to] = [from_ms, to_ms].map(|ms| Some(Instant::from_millis(ms)));
     let gap = Gap { from, to, cause, place: None, bytes: 0, words: String::new(), own: None };

@@ -1,7 +1,7 @@
 //! Messages and their descriptors in Protocol Buffers, by the
 //! [encoding](https://protobuf.dev/programming-guides/encoding/) and `descriptor.proto`.
 
-/// Of `FieldDescriptorProto`, and the full name of a message or an enumeration.
+/// The type's number in `FieldDescriptorProto`, and the full name if it is a message or an enumeration.
 pub(super) type Type = (u64, &'static str);
 
 pub(super) const DOUBLE: Type = (1, "");
