@@ -4,10 +4,9 @@
 use hums_core::clock::Instant;
 use hums_core::health::Level;
 
-use super::row::{Cell, Row, count, text};
+use super::row::{Cell, Row, count, single, text};
 use crate::check::judged::{JudgedBy, Judgement, TOO_LITTLE};
 use crate::check::problem::{Problem, problems};
-use crate::mavlink::values::Scalar;
 use crate::source::item::ColumnType;
 use crate::source::told::Finding;
 use crate::states;
@@ -135,8 +134,8 @@ pub fn finding_row(finding: &Finding, by: &str) -> Row {
             ("instance", count(finding.instance)),
             ("level", text(finding.level.name())),
             ("previous", text(finding.previous.name())),
-            ("value", Cell::Number(Scalar::Single(finding.value))),
-            ("limit", Cell::Number(Scalar::Single(finding.limit))),
+            ("value", single(finding.value)),
+            ("limit", single(finding.limit)),
             ("unit", text(finding.unit.as_str())),
             ("checked_by", text(by)),
         ],

@@ -4,10 +4,9 @@ use hums_blackbox::Gap;
 use hums_blackbox::record::Record;
 
 use super::checked::{BOARD, finding_row};
-use super::row::{Cell, Row, count, known, quantity, text};
+use super::row::{Cell, Row, count, known, quantity, single, text};
 use super::wear;
 use crate::loss;
-use crate::mavlink::values::Scalar;
 use crate::names::{clock_source_name, counter_name, event_name, fault_name};
 use crate::source::item::ColumnType;
 use crate::source::told::Finding;
@@ -74,7 +73,7 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         Record::Usage(usage) => {
             let moment = format!("{:?}", usage.moment).to_ascii_lowercase();
             let row = |(number, value)| {
-                let (name, value) = (Cell::Text(counter_name(number)), Cell::Number(Scalar::Single(value)));
+                let (name, value) = (Cell::Text(counter_name(number)), single(value));
                 Row::new("HUMS_USAGE", vec![("moment", text(&moment)), ("counter", name), ("value", value)])
             };
             usage.iter().map(row).collect()

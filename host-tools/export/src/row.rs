@@ -42,6 +42,11 @@ pub fn quantity(number: impl Into<f64>) -> Cell {
     Cell::Number(Scalar::Double(number.into()))
 }
 
+/// A cell with this quantity of single precision.
+pub fn single(number: f32) -> Cell {
+    Cell::Number(Scalar::Single(number))
+}
+
 /// A cell that may be unknown.
 pub fn known<T>(value: Option<T>, cell: impl FnOnce(T) -> Cell, unknown: ColumnType) -> Cell {
     value.map_or(Cell::Unknown(unknown), cell)

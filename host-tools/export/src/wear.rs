@@ -5,8 +5,7 @@ use hums_blackbox::record::{Component, Exceedance, Lifetime};
 
 use serde::Serialize;
 
-use super::row::{Cell, Row, count, quantity, text};
-use crate::mavlink::values::Scalar;
+use super::row::{Row, count, quantity, single, text};
 use crate::names::counter_name;
 use crate::summary::Contents;
 
@@ -54,7 +53,7 @@ pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {
             ("boots", count(life.boots)),
             ("sessions", count(life.sessions)),
             ("counter", text(counter_name(number))),
-            ("value", Cell::Number(Scalar::Single(value))),
+            ("value", single(value)),
         ];
         Row::new("HUMS_LIFETIME", cells)
     };
@@ -72,7 +71,7 @@ pub(super) fn exceedance(exceedance: &Exceedance<'_>) -> Vec<Row> {
             ("criticals", count(crossings.criticals)),
             ("warning[s]", quantity(f64::from(crossings.warning_tenths) / 10.0)),
             ("critical[s]", quantity(f64::from(crossings.critical_tenths) / 10.0)),
-            ("peak", Cell::Number(Scalar::Single(crossings.peak))),
+            ("peak", single(crossings.peak)),
             ("unit", text(exceedance.unit)),
         ];
         Row::new("HUMS_EXCEEDANCE", cells)
@@ -91,7 +90,7 @@ pub(super) fn component(component: &Component<'_>) -> Row {
         ("name", text(component.name)),
         ("serial", text(component.serial)),
         ("status", text(component.status.name())),
-        ("used[%]", Cell::Number(Scalar::Single(component.used_percent))),
+        ("used[%]", single(component.used_percent)),
         ("powered[s]", quantity(figures.powered_s)),
         ("flight[s]", quantity(figures.flight_s)),
         ("motor[s]", quantity(figures.motor_s)),

@@ -14,9 +14,8 @@ use crate::checked::{Checked, FindingCount, problems_of};
 use crate::context::Context;
 use crate::hex::hex;
 use crate::identity::RecordingContent;
-use crate::mavlink::values::Scalar;
 use crate::names::{CounterName, counter_meaning, counter_name};
-use crate::row::{Cell, Row, count, known, quantity, text};
+use crate::row::{Cell, Row, count, known, quantity, single, text};
 use crate::source::item::ColumnType;
 use crate::source::recording::Format;
 use crate::summary::BootLine;
@@ -154,7 +153,6 @@ fn health(context: &Context, about: &RecordingContent) -> Vec<(&'static str, Cel
     let due = parts.iter().filter(|part| part.used_percent.is_some());
     let due = due
         .max_by(|one, other| one.used_percent.unwrap_or(0.0).total_cmp(&other.used_percent.unwrap_or(0.0)));
-    let used_percent = due.and_then(|part| part.used_percent).map(Scalar::Single);
     cells.extend([
         ("criticals", count(of_level(Level::Critical))),
         ("warnings", count(of_level(Level::Warning))),
@@ -162,7 +160,7 @@ fn health(context: &Context, about: &RecordingContent) -> Vec<(&'static str, Cel
         ("worst_level", known(worst.map(|worst| worst.level.name().to_owned()), text, ColumnType::Text)),
         ("problems", text(serde_json::to_string(&json).unwrap_or_default())),
         ("most_used_part", known(due.map(|part| part.name.clone()), text, ColumnType::Text)),
-        ("most_used[%]", known(used_percent, Cell::Number, ColumnType::Single)),
+        ("most_used[%]", known(due.and_then(|part| part.used_percent), single, ColumnType::Single)),
         ("parts", text(serde_json::to_string(&parts).unwrap_or_default())),
     ]);
     cells

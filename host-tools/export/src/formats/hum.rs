@@ -67,7 +67,7 @@ fn run(args: &Decode) -> Result<Outcome> {
     done.remarks.extend(packer.words.iter().map(|words| format!("{}: {words}", place.title)));
     done.made.push(packer.finish(&place.title)?);
     let mut json = args.json.then(MadeJson::default);
-    let outcome = done.outcome().max(Outcome::lossy(found.is_lossy()));
+    let outcome = done.outcome().and(Outcome::lossy(found.is_lossy()));
     done.tell(json.as_mut(), 1)?;
     json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
     Ok(outcome)
@@ -80,13 +80,12 @@ fn check(args: &Decode) -> Result<()> {
         || args.to.is_some()
         || args.split.is_some()
         || !args.message.is_empty();
-    if args.inputs.len() > 1 || args.format.len() > 1 || is_part { Err(not_one()) } else { Ok(()) }
-}
-
-fn not_one() -> anyhow::Error {
-    usage(
+    if args.inputs.len() == 1 && args.format.len() == 1 && !is_part {
+        return Ok(());
+    }
+    Err(usage(
         "--format hum writes all of one recording, and no other format beside it: name one file, and no --session, --from, --to, --split or --message",
-    )
+    ))
 }
 
 fn output(args: &Decode) -> PathBuf {
